@@ -38,10 +38,10 @@ _VERBS: Final = {
 
 
 class _Verbs(LazyGroup):
-    """The verbs of canmon."""
+    """The command group with the verbs of canmon."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a verb; it ends when its output is no longer read."""
+        """Run a verb. The verb ends when its output is no longer read."""
         with until_unread():
             return super().invoke(ctx)
 

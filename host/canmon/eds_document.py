@@ -1,4 +1,4 @@
-"""EDS files that verbs are given, and the options that name them."""
+"""EDS files that are arguments of verbs, and the options that name such files."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ else:  # slow
 
 _YAML_ENDINGS = (".yml", ".yaml")
 _LOOKED_AT = 4096
-"""Number of characters at its start for detecting a binary file."""
+"""Number of characters at the start of a file that are used to detect a binary file."""
 
 
 def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documents.Document:
-    """Read a file; Refused if it cannot be read, is too large or binary, or is a bus.yml.
+    """Read a file. Raise Refused if it is unreadable, too large, binary, or a bus.yml.
 
     Args:
-        path: of the file.
-        what: the argument or option that names it.
-        encoding: name of its encoding in Python; empty to detect it.
+        path: path of the file.
+        what: argument or option that names the file.
+        encoding: Python name of the file's encoding, or empty to detect the encoding.
     """
     try:
         data = eds.read_eds_bytes(path)
@@ -69,7 +69,7 @@ def _is_binary(data: bytes) -> bool:
 
 
 def read_device_document(path: Path, what: str = "FILE") -> documents.Document:
-    """Read a file that must describe a device; Refused if it does not."""
+    """Read a file that must describe a device. Raise Refused if it does not."""
     document = read_document(path, what)
     if not document.rows:
         raise Refused(f"{what} " + "\n".join(map(str, document.file.errors)))
@@ -80,7 +80,7 @@ _IDENTITY: Final = 0x1018
 
 
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
-    """Read who a node is (1018h); None if it does not send vendor or product."""
+    """Read the identity of a node (1018h), or None if the node does not send vendor or product."""
     return eds_folder.node_identity([_number(bus, node_id, sub) for sub in (1, 2, 3)])
 
 
@@ -92,7 +92,7 @@ def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
 
 
 def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
-    """Return the EDS of a node: the given file, or the file of a folder that fits the node.
+    """Return the EDS of a node, either the given file, or the file of a folder that fits it.
 
     If a folder is given, a line on standard error names the chosen file, or reports that no file
     fits.
@@ -131,7 +131,7 @@ def node_eds_option(
     The value of `eds` is a path, a folder, or None.
 
     Args:
-        what: the help of `--eds`.
+        what: help text of `--eds`.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -151,7 +151,10 @@ def node_eds_option(
 
 
 def read_eds_folders(folders: Sequence[Path]) -> eds_folder.EdsFolder | None:
-    """Return what `--eds-dir` names; None without one, Refused if it is no folder."""
+    """Return the folders of `--eds-dir`, or None without the option.
+
+    Raise Refused for other paths.
+    """
     for folder in folders:
         try:
             next(folder.iterdir(), None)
@@ -170,14 +173,15 @@ def read_eds_paths(
     folders: Sequence[Path] = (),
     notify: Callable[[str], None] = say,
 ) -> eds_folder.EdsFiles:
-    """Read files by node-ID; Refused if one cannot be read, or is no EDS.
+    """Read files by node-ID. Raise Refused if a file cannot be read, or is not an EDS.
 
-    It reports mistakes in a file on standard error, and does not use the entries with mistakes.
+    The function reports mistakes in a file on standard error, and does not use the entries with
+    mistakes.
 
     Args:
-        paths: the files.
+        paths: path of each file by node-ID.
         folders: folders to search for files of other nodes.
-        notify: called with a line about each choice of a file.
+        notify: function that is called with a line about each choice of a file.
     """
     found = {node: _read(node, path) for node, path in paths.items()}
     if found:
@@ -186,7 +190,7 @@ def read_eds_paths(
 
 
 def eds_paths(words: Sequence[str]) -> dict[int, Path]:
-    """Return the files that `--eds` names, by node-ID; Refused if a word is wrong."""
+    """Return the files that `--eds` names, by node-ID. Raise Refused if a word is wrong."""
     return {node: path for word in words for node, path in _split(word).items()}
 
 

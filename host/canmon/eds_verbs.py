@@ -33,17 +33,17 @@ _FOUND: Final = 1
 
 
 _UNREAD: Final = "unread"
-"""The test case of a file that cannot be read."""
+"""Name of the test case of a file that cannot be read."""
 
 
 class _Case(NamedTuple):
-    """A finding for the report: its rule and its line."""
+    """A finding for the report, with its rule and its line."""
 
     rule: str
     text: str
 
     def __str__(self) -> str:
-        """Return the line."""
+        """Return the line of the finding."""
         return self.text
 
 
@@ -84,7 +84,7 @@ def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | 
 
 
 def _read(files: Sequence[Path]) -> tuple[list[Document], list[_Case]]:
-    """Read the files; report unreadable ones, and continue with the others."""
+    """Read the files. Report unreadable files, and continue with the other files."""
     documents, unread = [], []
     for path in files:
         try:
@@ -96,7 +96,7 @@ def _read(files: Sequence[Path]) -> tuple[list[Document], list[_Case]]:
 
 
 def _finding_json(one: RuleFinding) -> str:
-    """Write a finding as an object."""
+    """Return a finding as a JSON object."""
     said = {
         "v": 1,
         "file": one.file,
@@ -127,7 +127,7 @@ def _write(
     unread: Sequence[_Case],
     failures: Sequence[RuleFinding],
 ) -> None:
-    """Write a test case for each rule of each file, and one for each that was not read."""
+    """Write a test case for each rule of each file, and for each file that cannot be read."""
     if report is None:
         return
     cases = [*unread, *(_Case(f"{one.file}: {one.rule.name}", str(one)) for one in failures)]
@@ -193,7 +193,7 @@ def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_enc
 
 
 def _known(encoding: str) -> str:
-    """Return the name of an encoding of texts, or empty; Refused if the name is unknown."""
+    """Return the name of an encoding of texts, or empty. Raise Refused if the name is unknown."""
     try:
         b"a".decode(encoding or "ascii")
     except LookupError:
@@ -203,7 +203,7 @@ def _known(encoding: str) -> str:
 
 
 def _mendable(file: Path, encoding: str) -> Document:
-    """Read a file that can be fixed; Refused if it is XML, or describes no object."""
+    """Read a file that can be fixed. Raise Refused if it is XML or describes no object."""
     document = read_document(file, encoding=encoding)
     if document.file.is_xml:
         raise Refused(f"FILE {file}: XDD files cannot be fixed")
@@ -213,7 +213,7 @@ def _mendable(file: Path, encoding: str) -> Document:
 
 
 def _mended(one: RuleFinding) -> str:
-    """Print the fixed findings and their replacements."""
+    """Print the fixed findings and the text that replaces them."""
     lines = [text for edit in one.edits for text in edit.lines if text]
     more = f" and {len(lines) - 1} more" if lines[1:] else ""
     left_out = any(edit.place is EditPlace.REPLACE for edit in one.edits)
@@ -223,7 +223,7 @@ def _mended(one: RuleFinding) -> str:
 
 
 def _differences(old: Document, new: Document) -> Iterator[str]:
-    """Yield the lines that differ, as `diff -u`; unprintable characters as ?."""
+    """Yield the lines that differ, as `diff -u` does. Unprintable characters become ?."""
     lines = difflib.unified_diff(old.texts, new.texts, old.name, new.name, n=1, lineterm="")
     for line in lines:
         yield "".join(letter if letter.isprintable() else "?" for letter in line)
@@ -281,7 +281,7 @@ def _place(text: str | None) -> tuple[int | None, int | None]:
 def _describe(
     document: Document, index: int | None, sub: int | None, node_id: int
 ) -> dict[str, Any]:
-    """Return the data to show; without head and PDOs for a single object."""
+    """Return the data to show. For a single object, head and PDOs are omitted."""
     said: dict[str, Any] = {"v": 1, "file": document.name}
     if index is None:
         said["device"] = head(document)

@@ -1,4 +1,4 @@
-"""What installed packages add to `canmon`: decoders and check rules (docs/howto/extending.md)."""
+"""Decoders and check rules that installed packages add to `canmon` (docs/howto/extending.md)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
 
     Raises:
         OSError: a DBC file cannot be read.
-        DbcError: it is malformed, or cantools is not installed.
+        DbcError: the DBC file is malformed, or cantools is not installed.
     """
     from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - slow
 
@@ -62,7 +62,7 @@ def load_rule(name: str) -> Callable[[], Rule]:
     """Return the factory of a check rule of an installed package.
 
     Raises:
-        ExtensionError: there is no such rule, or it cannot be used.
+        ExtensionError: the rule does not exist, or cannot be used.
     """
     try:
         found = _DECODERS.load(name)
@@ -83,7 +83,7 @@ def load_rule(name: str) -> Callable[[], Rule]:
 
 
 class _CheckedDecoder:
-    """A foreign decoder, left out once it has raised."""
+    """A decoder of another package, which is left out after it has raised an error."""
 
     def __init__(self, name: str, decoder: FrameDecoder) -> None:
         self._name, self._decoder, self._broken = name, decoder, False
@@ -100,7 +100,7 @@ class _CheckedDecoder:
 
 
 class _CheckedRule(Rule):
-    """A foreign rule; what it raises ends the command in one line."""
+    """A rule of another package. An error that the rule raises ends the command with one line."""
 
     def __init__(self, name: str, rule: Rule) -> None:
         self.name, self._rule = name, rule

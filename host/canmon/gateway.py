@@ -1,4 +1,4 @@
-"""The verb `gateway`: a CANopen network for programs that speak lines of text (CiA 309-3)."""
+"""The verb `gateway`, which serves a CANopen network to programs in lines of text (CiA 309-3)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tickrig.host.text.values import parse_port
 
 _LOOPBACK: Final = "127.0.0.1"
 _WAIT_US: Final = 20_000
-"""How long clients are waited for before the bus is listened to again."""
+"""Time to wait for clients before the bus is read again."""
 _MAX_LINE: Final = 16 << 20
 _MOST_NET: Final = 0xFFFF
 _ERROR: Final = "] ERROR:"
@@ -78,7 +78,7 @@ def command(
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """Read HOST:PORT or PORT; Refused if it is neither."""
+    """Read HOST:PORT or PORT. Raise Refused if the text is neither."""
     host, colon, port = text.rpartition(":")
     number = parse_port(port)
     if number is None or (colon and not host):
@@ -87,7 +87,7 @@ def parse_address(text: str) -> tuple[str, int]:
 
 
 def _answer_input(gateway: Gateway) -> None:
-    """Answer standard input; exit status 1 if a command was not carried out."""
+    """Answer standard input. Return exit status 1 if a command was not carried out."""
     failed, shown = False, sys.stdout.isatty()
     for line in sys.stdin.buffer:
         answer = gateway.answer(line.decode("latin-1").rstrip("\r\n"))
@@ -103,7 +103,7 @@ def _answer_input(gateway: Gateway) -> None:
 def _listening(
     address: tuple[str, int] | None, path: Path | None
 ) -> Iterator[tuple[socket.socket, str]]:
-    """Listen; give the socket, and its address for people."""
+    """Listen for clients. Yield the socket, and its address as text for the user."""
     if path is not None:
         with refusing("socket"):
             listener = listen_at(path)
@@ -129,7 +129,7 @@ def _listening(
 
 
 def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> None:
-    """Answer clients until Ctrl-C; read the bus in between, so that no queue fills."""
+    """Answer clients until Ctrl-C. Read the bus in between, so that no queue overflows."""
     stopped: list[bool] = []
 
     def begin() -> Answer:
@@ -145,7 +145,7 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> No
 
 
 def _answering(gateway: Gateway) -> Answer:
-    """Return what answers the lines of a client."""
+    """Return the function that answers the lines of a client."""
     return lambda line: _line(gateway.answer(line.decode("latin-1").rstrip("\r")))
 
 

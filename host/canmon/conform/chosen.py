@@ -14,7 +14,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 
 def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return the given groups and ids separately.
+    """Return the given groups, and separately the given ids.
 
     >>> patterns("NMT,HB"), patterns(["PR-*", "UE-01"])
     (('NMT', 'HB'), ('PR-*', 'UE-01'))
@@ -27,7 +27,7 @@ def unknown(words: Iterable[str]) -> list[str]:
     """Yield an error for each word that matches no check, with a suggestion.
 
     Args:
-        words: groups or ids, with * and ?.
+        words: names of groups or ids, with * and ?.
     """
 
     def is_one(word: str) -> bool:
@@ -42,10 +42,10 @@ def _chosen(only: Sequence[str]) -> list[Check]:
     """Return the selected checks of the suite, of any level.
 
     Args:
-        only: groups or ids, with * and ?; all if empty.
+        only: names of groups or ids, with * and ?. If it is empty, all checks are selected.
 
     Raises:
-        Refused: a word that matches no check.
+        Refused: a word matches no check.
     """
     for text in unknown(only):
         raise Refused(f"--only {text}; see --list")
@@ -53,7 +53,7 @@ def _chosen(only: Sequence[str]) -> list[Check]:
 
 
 def _near(word: str) -> str:
-    """Return the probable name, or the groups."""
+    """Return the probable name, or the names of the groups."""
     groups = list(group_titles())
     if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite_checks())])):
         return f"did you mean {close[0]!r}?"
@@ -61,7 +61,7 @@ def _near(word: str) -> str:
 
 
 def check_chosen(only: Sequence[str], level: Level) -> None:
-    """Raise Refused if a word matches no check, or none of this level."""
+    """Raise Refused if a word matches no check, or no check of this level."""
     _chosen(only)
     for word in only:
         named = _chosen([word])
@@ -80,11 +80,12 @@ def listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str
     """Yield a line for each check, of any level, and then a line for each group.
 
     Args:
-        only: groups or ids, with * and ?, in any case; all if empty.
-        device: device of an EDS, for the checks of its objects.
+        only: names of groups or ids, with * and ?, in upper or lower case. If it is empty, all
+            checks are listed.
+        device: device of an EDS, used for the checks of its objects.
 
     Raises:
-        Refused: a word that matches no check.
+        Refused: a word matches no check.
     """
     checks = [*_chosen(only), *_of_objects(only, device)]
     wide = max((len(check.id) for check in checks), default=0) + 2

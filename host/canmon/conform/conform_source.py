@@ -1,4 +1,4 @@
-"""Sources of the node under test: a python-can bus, or a rig file in virtual time."""
+"""Sources of the node under test, which are a python-can bus or a rig file in virtual time."""
 
 from __future__ import annotations
 
@@ -36,30 +36,32 @@ _RIGS: Final = ExtensionGroup[Any](
     callable,
     "a function",
 )
-"""The function that opens a rig file, loaded by name because hosts do not import emulators."""
+"""Module and name of the function that opens a rig file. Hosts must not import emulators."""
 
 
 _LOCAL: Final = ("virtual", "udp_multicast")
-"""Interfaces of python-can whose bus connects processes, mostly of one machine."""
+"""Interfaces of python-can whose bus connects processes, mostly processes of one machine."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConformSource:
-    """An open bus.
+    """An open bus with the node under test.
 
     Attributes:
-        link: the bus.
-        name: its name for messages.
+        link: connection to the bus.
+        name: name of the bus for messages.
         adapter: description of the adapter.
-        bit_rate: in bit/s, None if unknown.
-        virtual: whether it has no other participants and runs in virtual time.
-        shared_host: whether its nodes may be processes of this machine.
-        nodes: known nodes, by node-ID.
-        eds: names of the EDS of these nodes, by node-ID; the files need not exist.
-        describe: returns the known description of a node, None if it has no EDS.
-        stimulus: makes the stimuli of a node; None if there are none.
-        close: closes the bus.
-        watch: reports disturbances of the bus, and exceptions that nodes raise, to a run.
+        bit_rate: bit rate of the bus in bit/s, or None if unknown.
+        virtual: whether the bus has no other participants and runs in virtual time.
+        shared_host: whether the nodes of the bus may be processes of this machine.
+        nodes: known nodes by node-ID.
+        eds: name of the EDS of each node, by node-ID. The files need not exist.
+        describe: function that returns the known description of a node, or None if the node has no
+            EDS.
+        stimulus: function that makes the stimuli of a node, or None if there are none.
+        close: function that closes the bus.
+        watch: function that reports disturbances of the bus, and exceptions that nodes raise, to a
+            run.
     """
 
     link: StampedLink
@@ -79,17 +81,18 @@ class ConformSource:
 def open_conform_source(
     word: str | None, node_id: int | None, options: BusOptions
 ) -> ConformSource:
-    """Open a SOURCE.
+    """Open the SOURCE of the command line.
 
     Args:
-        word: `can0`, `slcan:/dev/ttyACM0@500k`, a rig file such as `bench.toml`; None if the
-            options name a bus.
-        node_id: of the node, which selects the bus of a rig with several; None for the first.
-        options: interface, bit rate and others of a bus.
+        word: word on the command line, such as `can0`, `slcan:/dev/ttyACM0@500k` or a rig file
+            `bench.toml`. It is None if the options name a bus.
+        node_id: node-ID of the node, which selects the bus of a rig with several buses. None
+            selects the first bus.
+        options: options of a bus, such as interface and bit rate.
 
     Raises:
-        Refused: it is not a bus with nodes.
-        SourceFailed: it cannot be opened.
+        Refused: the source is not a bus with nodes.
+        SourceFailed: the source cannot be opened.
     """
     if word is None and not options:
         raise Refused("no SOURCE: name a bus as can0, or a rig file as bench.toml")
@@ -149,7 +152,7 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
 
 
 def _is_local(interface: str, channel: object) -> bool:
-    """Return whether a bus connects processes of this machine, such as vcan."""
+    """Return whether a bus connects processes of this machine, as vcan does."""
     if interface in _LOCAL:
         return True
     net = Path("/sys/class/net", str(channel))

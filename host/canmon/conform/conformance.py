@@ -1,4 +1,4 @@
-"""One call of `canmon conform`: open the source, ask, run the checks, report."""
+"""One call of `canmon conform`: opening the source, asking the user, running checks, reporting."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ _HTML: Final = "--html"
 
 
 def check_files(files: Mapping[str, Path]) -> None:
-    """Check that the files can be written; Refused if one cannot.
+    """Check that the files can be written. Raise Refused if a file cannot be written.
 
     Args:
-        files: by option.
+        files: path of each file by option.
     """
     for option, path in files.items():
         with refusing():
@@ -71,11 +71,11 @@ def check_files(files: Mapping[str, Path]) -> None:
 
 
 def _keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
-    """Check that no report overwrites an input of the run; Refused if one would.
+    """Check that no report overwrites an input of the run. Raise Refused if a report would.
 
     Args:
-        files: by option.
-        inputs: paths that are read; others than files are ignored.
+        files: path of each file by option.
+        inputs: paths that are read. Paths that are not files are ignored.
     """
     read = tuple(inputs)
     for option, path in files.items():
@@ -86,13 +86,13 @@ def _keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
 def _write_files(
     report: Report, files: Mapping[str, Path], baseline: Baseline, show: ShowFrames
 ) -> bool:
-    """Write the files; report those that fail, and return whether all were written.
+    """Write the files. Report files that fail, and return whether all files were written.
 
     Args:
-        report: the run.
-        files: by option.
-        baseline: known failures.
-        show: writes frames.
+        report: report of the run.
+        files: path of each file by option.
+        baseline: baseline of known failures.
+        show: function that formats frames.
     """
     written = True
     for option, path in files.items():
@@ -105,13 +105,14 @@ def _write_files(
 
 
 def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames) -> str:
-    """Return the content of the file of an option.
+    """Return the content of the file that an option requests.
 
     Args:
-        option: `--html`, `--junit`, `--badge`, `--issue`, else the failures as a baseline.
-        report: the run.
-        baseline: known failures.
-        show: writes frames.
+        option: name of the option, such as `--html`, `--junit`, `--badge` or `--issue`. For any
+            other name, the content is the failures as a baseline.
+        report: report of the run.
+        baseline: baseline of known failures.
+        show: function that formats frames.
     """
     match option:
         case "--html":
@@ -132,13 +133,13 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 
 
 def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
-    """Return a writer for the lines of a check; each call starts with the EDS only.
+    """Return a function that formats the lines of a check. Each call starts with the EDS only.
 
     The evidence does not contain the frames between two checks. Therefore transfers and mappings of
     one check are not valid in the next.
 
     Args:
-        eds: an EDS, or the result of reading one, by node-ID.
+        eds: EDS, or the result of reading an EDS, by node-ID.
 
     Raises:
         OSError: an EDS cannot be read.
@@ -172,15 +173,15 @@ _FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
 
 class Conformance:
-    """One call of the command.
+    """One call of the command `canmon conform`.
 
     Args:
-        word: the SOURCE; None if the options name a bus.
-        bus: options of a bus.
-        options: the other options, by name.
+        word: SOURCE word on the command line, or None if the options name a bus.
+        bus: options of the bus.
+        options: values of the other options by name.
 
     Raises:
-        Refused: impossible options; nothing was sent.
+        Refused: the options are impossible. Nothing was sent.
     """
 
     def __init__(self, word: str | None, bus: BusOptions, options: dict[str, Any]) -> None:
@@ -202,7 +203,7 @@ class Conformance:
         self._document = read_device_document(self._eds, "--eds") if self._eds else None
 
     def _inputs(self) -> Iterator[Path]:
-        """Yield the files that are read; a baseline may be overwritten."""
+        """Yield the files that are read. A baseline may be overwritten."""
         options = self._options
         if self._word and self._word.lower().endswith(RIG_FILE):
             yield Path(self._word)
@@ -215,7 +216,7 @@ class Conformance:
             yield from map(Path, (words, *words.split()))
 
     def run(self) -> int:
-        """Run it; return the exit status."""
+        """Run the command. Return the exit status."""
         node_id: int | None = self._options["node"]
         if node_id is None and (self._files or self._options["as_json"]):
             raise Refused("--node is missing: it is needed for checks and reports")
@@ -229,7 +230,7 @@ class Conformance:
         return INTERRUPTED if report is None else self._show(report)
 
     def _judge(self, source: ConformSource, node_id: int) -> Report | None:
-        """Return the report; None if it was interrupted before the start."""
+        """Return the report, or None if the run was interrupted before the start."""
         consent = Consent(
             yes=self._options["yes"], virtual=source.virtual, alone=len(source.nodes) == 1
         )
@@ -256,7 +257,10 @@ class Conformance:
         return self._completed(judged[0], source, known) if judged else None
 
     def _describe(self, source: ConformSource, node_id: int) -> NodeDescription | None:
-        """Return what an EDS says about the node: that of --eds or --eds-dir, or of the source."""
+        """Return what an EDS says about the node.
+
+        The EDS is from --eds, --eds-dir, or the source.
+        """
         if self._eds is None and self._options["eds"] is not None:
             self._eds = chosen_eds(self._options["eds"], NodeBus(source.link), node_id)
             self._document = read_device_document(self._eds, "--eds-dir") if self._eds else None
@@ -267,7 +271,7 @@ class Conformance:
     def _completed(
         self, report: Report, source: ConformSource, known: NodeDescription | None
     ) -> Report:
-        """Add data from outside the tester: versions, adapter, findings in the EDS."""
+        """Add data from outside the tester, such as versions, adapter, and findings in the EDS."""
         settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
         if known is None:
             return replace(report, settings=settings)
@@ -295,7 +299,7 @@ class Conformance:
         )
 
     def _show(self, report: Report) -> int:
-        """Write all requested files; return the exit status."""
+        """Write all requested files. Return the exit status."""
         eds = {} if self._eds is None else {report.node_id: self._eds}
         with until_unread():
             if self._options["as_json"]:

@@ -1,4 +1,4 @@
-"""Stimuli of the device: a command, an operator, or an emulator's control socket."""
+"""Stimuli of the device by a command, an operator, or the control socket of an emulator."""
 
 from __future__ import annotations
 
@@ -34,17 +34,20 @@ from tickrig.wire.errors import FieldError
 # Sets inputs of an emulated device by signal name (docs/reference/bench/control.md).
 
 _HEX = "hex:"
-"""Prefix of the bytes of an octet string or a domain."""
+"""Prefix for the bytes of an octet string or a domain."""
 
 _LINES: Final = 8
-"""Lines per group: `di1` is lines 1 to 8, `di2` the next ones."""
+"""Number of lines per group. `di1` stands for lines 1 to 8, `di2` for lines 9 to 16."""
 _CHANNEL: Final = re.compile(r"(di|do|ai)([1-9][0-9]{0,2})")
 _INPUTS: Final = {"6000": "di", "6401": "ai"}
-"""Objects of CiA 401 that show the inputs."""
+"""Objects of CiA 401 that show inputs, with the names of these inputs."""
 
 
 class LinearConverter(NamedTuple):
-    """A linear converter: from `low` to `high` the object goes from `first` to `last` by `step`."""
+    """A linear converter.
+
+    From `low` to `high`, the object goes from `first` to `last` in steps of `step`.
+    """
 
     low: float
     high: float
@@ -54,14 +57,14 @@ class LinearConverter(NamedTuple):
 
 
 class SignalStimulus(ABC):
-    """Executes the words of a check: sets, reads and switches by name."""
+    """Stimulus that executes the words of a check. It sets, reads and switches signals by name."""
 
     def __call__(self, *words: str) -> str:
         """Execute a stimulus, and return the read value.
 
         Raises:
-            NotAllowed: the device does not support it.
-            Disturbed: it failed.
+            NotAllowed: the device does not support the stimulus.
+            Disturbed: the stimulus failed.
         """
         try:
             return self._act(*words)
@@ -90,7 +93,7 @@ class SignalStimulus(ABC):
         return ""
 
     def _input(self, name: str, value: str) -> None:
-        """Set an input; for a CiA 401 module eight lines or counts, also by object."""
+        """Set an input. A CiA 401 module also accepts an object, for eight lines or for counts."""
         module = "di1" in self.names() or self._channels("ai1")
         index, _, sub = name.partition(":")
         if module and index in _INPUTS:
@@ -117,11 +120,11 @@ class SignalStimulus(ABC):
         return span.low + part * (span.high - span.low)
 
     def _channels(self, name: str) -> list[str]:
-        """Return an analogue input that has a unit: `ai1_v` is `ai1`."""
+        """Return an analogue input that has a unit. `ai1_v` is the input `ai1`."""
         return [each for each in self.names() if each.startswith(f"{name}_")]
 
     def _set_lines(self, number: int, levels: int) -> None:
-        """Set eight lines; missing lines can only be low."""
+        """Set eight lines. Missing lines can only be low."""
         for bit in range(_LINES):
             line, level = f"di{_LINES * (number - 1) + bit + 1}", levels >> bit & 1
             if line in self.names():
@@ -138,34 +141,37 @@ class SignalStimulus(ABC):
         return _hex(self.get(signal), self.unit(signal))
 
     def _set_emergency(self, code: int) -> None:
-        """Start or clear an error; only one at a time is possible."""
+        """Start or clear an error. Only one error at a time is possible."""
         if code and self.get("emergency"):
             raise NotAllowed("a second error at once: the device takes one by hand")
         self.set("emergency", code)
 
     @abstractmethod
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if that is impossible."""
+        """Set an input. Raise ValueError if that is impossible."""
 
     @abstractmethod
     def get(self, name: str) -> Setting:
-        """Return the value of a signal; ValueError if there is none."""
+        """Return the value of a signal. Raise ValueError if there is no such signal."""
 
     @abstractmethod
     def names(self) -> Collection[str]:
-        """Return the names of all its signals."""
+        """Return the names of all signals of the device."""
 
     @abstractmethod
     def unit(self, name: str) -> str:
-        """Return the unit of a signal, of an object its data type; empty if it has none."""
+        """Return the unit of a signal, or the data type of an object.
+
+        Return an empty text without one.
+        """
 
     @abstractmethod
     def span(self, name: str) -> LinearConverter | None:
-        """Return the converter of an input, None if unknown."""
+        """Return the converter of an input, or None if it is unknown."""
 
     @abstractmethod
     def switch(self, *, on: bool) -> None:
-        """Switch the supply."""
+        """Switch the power supply."""
 
 
 def _signal_name(name: str) -> str:
@@ -181,7 +187,7 @@ def _signal_name(name: str) -> str:
 
 
 def _value(text: str, unit: str) -> Setting:
-    """Read the bytes of an object as its type, or as a number."""
+    """Read the bytes of an object as the type of the object, or as a number."""
     if unit not in DataType.__members__:
         return parse_setting(text)
     value = DataType[unit].decode(bytes.fromhex(text))
@@ -189,7 +195,7 @@ def _value(text: str, unit: str) -> Setting:
 
 
 def _hex(value: Setting, unit: str) -> str:
-    """Write the value of an object as on the bus."""
+    """Return the value of an object in hex, as it is sent on the bus."""
     if unit not in DataType.__members__:
         return str(value)
     if isinstance(value, str) and value.startswith(_HEX):
@@ -200,20 +206,20 @@ def _hex(value: Setting, unit: str) -> str:
 _OPERATOR: Final = "ask"
 CONTROL: Final = "control:"
 _CANNOT: Final = 77
-"""Exit status of a command for an unsupported input, as in C test suites."""
+"""Exit status of a command that does not support an input, as in C test suites."""
 _PATIENCE_S: Final = 30
-"""Time-out of a command."""
+"""Time-out of a command in seconds."""
 
 
 def open_stimulus(text: str) -> Stimulus:
     """Return the stimuli for the inputs.
 
     Args:
-        text: `ask`, `control:PATH`, or the path of a control socket; any other text is a command
-            with its arguments.
+        text: words of the option: `ask`, `control:PATH`, or the path of a control socket. Any other
+            text is a command with its arguments.
 
     Raises:
-        Refused: another form.
+        Refused: the text has another form.
     """
     if text == _OPERATOR:
         if not sys.stdin.isatty():
@@ -232,7 +238,7 @@ def open_stimulus(text: str) -> Stimulus:
 
 
 def _ask_operator(*words: str) -> str:
-    """Ask a person; values of outputs are typed in."""
+    """Ask the operator, who also types in values of outputs."""
     text = one_line(" ".join(words))
     if words[0] == "output":
         return str(click.prompt(f"What is {text}, in hex", err=True))
@@ -242,21 +248,22 @@ def _ask_operator(*words: str) -> str:
 
 
 class CommandStimulus:
-    """Calls a command with the words of the check appended, without a shell.
+    """Stimulus that calls a command with the words of the check appended, without a shell.
 
     Args:
-        words: the command.
+        words: command and its arguments.
     """
 
     def __init__(self, words: list[str]) -> None:
         self._words = words
 
     def __call__(self, *words: str) -> str:
-        """Call the command, and return its first line of output.
+        """Call the command. Return the first line of its output.
 
         Raises:
-            NotAllowed: it ends with `_CANNOT`.
-            Disturbed: it cannot be run, does not end, or ends with an exit status other than 0.
+            NotAllowed: the command ends with `_CANNOT`.
+            Disturbed: the command cannot be run, does not end, or ends with an exit status other
+                than 0.
         """
         line = " ".join([*self._words, *words])
         try:
@@ -281,13 +288,13 @@ class CommandStimulus:
 
 
 class _ControlStimulus(SignalStimulus):
-    """The control socket of an emulator (docs/reference/bench/control.md).
+    """Stimulus through the control socket of an emulator (docs/reference/bench/control.md).
 
     Args:
-        path: of the socket.
+        path: path of the socket.
 
     Raises:
-        Refused: no answer.
+        Refused: the socket does not answer.
     """
 
     def __init__(self, path: Path) -> None:
@@ -349,14 +356,14 @@ class _ControlStimulus(SignalStimulus):
 # Nodes on a bus, found by listening only.
 
 _LISTEN_US: Final = 1_500_000
-"""Listening time, longer than most heartbeat periods; silent nodes are not found."""
+"""Listening time, which is longer than most heartbeat periods. Silent nodes are not found."""
 
 _FUNCTIONS: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
 """Frames of slaves in the pre-defined connection set (CiA 301 v4.2, 7.3.5)."""
 
 
 def list_nodes(source: ConformSource) -> int:
-    """List the nodes on a bus if no node was given; return the exit status."""
+    """List the nodes on a bus if no node was given. Return the exit status."""
     found: list[dict[int, str]] = [source.nodes] if source.virtual else []
     with until_interrupted():
         if not found:
@@ -374,10 +381,10 @@ def list_nodes(source: ConformSource) -> int:
 
 
 def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
-    """Listen; return the number of frames by node-ID.
+    """Listen to a bus. Return the number of frames by node-ID.
 
     Args:
-        link: the bus; received frames are consumed.
+        link: connection to the bus. Received frames are consumed.
         span_us: duration in microseconds.
     """
     heard: dict[int, int] = {}
@@ -390,7 +397,7 @@ def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
 
 
 def _node_of(frame: CanFrame) -> int | None:
-    """Return the node-ID of the sender by the CAN-ID of a frame; None if unknown."""
+    """Return the node-ID of a frame's sender according to its CAN-ID, or None if it is unknown."""
     node_id = frame.can_id & 0x7F
     sent = not (frame.extended or frame.remote) and node_id
     return node_id if sent and frame.can_id & 0x780 in _FUNCTIONS else None
@@ -410,12 +417,12 @@ _DOES = {
 
 
 class Consent:
-    """Asks the user, or has the consent already.
+    """Consent of the user, which is requested or already given.
 
     Args:
-        yes: `--yes`: consent to all.
-        virtual: a rig in virtual time, where nothing moves.
-        alone: there is no other node.
+        yes: whether `--yes` gives consent to all actions.
+        virtual: whether the source is a rig in virtual time, where nothing moves.
+        alone: whether there is no other node on the bus.
     """
 
     def __init__(self, *, yes: bool, virtual: bool, alone: bool = False) -> None:
@@ -427,7 +434,7 @@ class Consent:
         return sys.stdin.isatty() and sys.stderr.isatty()
 
     def begin(self, node_id: int, level: Level, others: dict[int, int]) -> None:
-        """Show other nodes on the bus, and ask before the first frame that changes anything.
+        """Show other nodes on the bus. Ask before the first frame that changes anything.
 
         Raises:
             Refused: the answer is no, or there is no terminal to ask.
@@ -444,9 +451,9 @@ class Consent:
             raise Refused("not started")
 
     def confirm(self, question: str) -> bool:
-        """Ask the user; the answer is no without a terminal.
+        """Ask the user. Without a terminal, the answer is no.
 
-        In a rig only LSS needs a question, because other nodes would answer too.
+        In a rig, only LSS needs a question, because other nodes would also answer.
         """
         if self._yes:
             return True
@@ -458,7 +465,7 @@ class Consent:
 
 
 class Progress:
-    """A progress line of a run on a terminal; none in a pipe.
+    """A progress line of a run on a terminal. In a pipe, there is no progress line.
 
     Args:
         shown: whether there is a terminal.

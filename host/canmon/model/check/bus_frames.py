@@ -1,4 +1,4 @@
-"""The frames of a log as arrays, one set for each bus, for rules that need all frames."""
+"""The frames of a log as arrays, one set for each bus. Rules that need all frames use them."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ _SPIKE_FRAMES: Final = 3
 
 
 class FramePlace(NamedTuple):
-    """Where a frame is.
+    """The place of a frame in a log.
 
     Attributes:
-        number: its place in the log, from 1.
-        at_us: its time.
+        number: position of the frame in the log, from 1.
+        at_us: time of the frame.
     """
 
     number: int
@@ -53,11 +53,11 @@ class Hit(NamedTuple):
 
     Attributes:
         rule: name of the rule.
-        node: the node-ID; None if no node is to blame.
-        ident: the CAN-ID with flags; None for the bus as a whole.
-        text: what is wrong.
-        rows: rows, on the bus, of the frames that show it; at least one.
-        amount: number of times it happened in these frames.
+        node: node-ID of the responsible node, or None if no node is responsible.
+        ident: CAN-ID with flags, or None for the bus as a whole.
+        text: description of the violation.
+        rows: rows of the bus with the frames that show the violation. There is at least one row.
+        amount: number of violations in these frames.
     """
 
     rule: str
@@ -72,13 +72,13 @@ class BusFrames:
     """The frames of one bus in the order of the log.
 
     Attributes:
-        name: of the bus.
-        at_us: times as in the log.
-        ident: see `any_ident`; error frames have `ERROR` and their class.
-        dlc: bytes of data, for a remote frame its DLC.
-        payload: the first 8 data bytes as a little-endian number.
+        name: name of the bus.
+        at_us: times of the frames as in the log.
+        ident: identifiers as `any_ident` returns them. Error frames have `ERROR` and their class.
+        dlc: number of data bytes. For a remote frame, it is the DLC.
+        payload: first 8 data bytes as a little-endian number.
         number: positions in the log, from 1.
-        sent: 1 for frames that the recorder sent.
+        sent: value 1 for frames that the recorder sent.
     """
 
     def __init__(self, name: str) -> None:
@@ -88,7 +88,7 @@ class BusFrames:
         self.payload, self.number = array("Q"), array("q")
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of frames."""
         return len(self.at_us)
 
     def add(self, record: Record, number: int) -> None:
@@ -103,7 +103,7 @@ class BusFrames:
         self.sent.append(record.sent)
 
     def extend(self, frames: Columns, numbers: Any) -> None:
-        """Append a block of frames; `numbers` is an array of their places."""
+        """Append a block of frames. `numbers` is an array of their positions in the log."""
         self.at_us.frombytes(frames.at_us.astype("<i8").tobytes())
         self.ident.frombytes(frames.ident.astype("<u8").tobytes())
         self.dlc.frombytes(frames.dlc.tobytes())
@@ -122,11 +122,11 @@ class BusFrames:
         return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, bool(ident & EXTENDED))
 
     def place(self, row: int) -> FramePlace:
-        """Return where a frame is."""
+        """Return the place of a frame in the log."""
         return FramePlace(self.number[row], self.at_us[row])
 
     def rows_by_ident(self) -> dict[int, Sequence[int]]:
-        """Return the rows of each identifier, in order."""
+        """Return the rows of each identifier, in the order of the log."""
         if not self.is_large:
             rows: dict[int, list[int]] = {}
             for row, ident in enumerate(self.ident):
@@ -154,7 +154,7 @@ class BusFrames:
         return len(self) >= _MANY and find_spec("numpy") is not None
 
     def picked(self, column: array[int], rows: Sequence[int]) -> Sequence[int]:
-        """Return values of some rows; an array of numpy where the rows are one."""
+        """Return the values of some rows. If the rows are an array of numpy, so are the values."""
         if isinstance(rows, list | tuple | range):
             return [column[row] for row in rows]
         kinds = {"q": np.int64, "Q": np.uint64, "B": np.uint8}
@@ -162,13 +162,13 @@ class BusFrames:
         return found  # type: ignore[no-any-return]
 
     def latest(self, times: array[int], begin: int = 0) -> int:
-        """Return the latest of times, from a row on."""
+        """Return the latest time from a row on."""
         if self.is_large:
             return int(np.frombuffer(times, np.int64)[begin:].max())
         return max(times[begin:])
 
     def backward(self) -> list[int]:
-        """Return the rows whose time is before that of the row before them."""
+        """Return the rows whose time is before the time of the previous row."""
         if self.is_large:
             times = np.frombuffer(self.at_us, np.int64)
             backward: list[int] = (np.flatnonzero(times[1:] < times[:-1]) + 1).tolist()
@@ -209,11 +209,11 @@ def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], l
 
 
 class FrameKeeper:
-    """Keeps the frames of a source, bus by bus.
+    """Storage of all frames of a source, separately for each bus.
 
     Attributes:
-        buses: by name.
-        frames: how many came.
+        buses: frames of each bus, by name.
+        frames: number of frames taken.
     """
 
     def __init__(self) -> None:
@@ -221,7 +221,7 @@ class FrameKeeper:
         self.frames = 0
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Take frames: a block of columns, or records."""
+        """Take frames, as a block of columns or as records."""
         if not isinstance(frames, list | tuple) and isinstance(frames, column_frames.Columns):
             self._extend(frames)
             return
@@ -244,11 +244,11 @@ class FrameKeeper:
         self.frames += len(columns)
 
     def around(self, number: int, frames: int) -> tuple[int, list[Record]]:
-        """Return the frames around one, which must not be CAN FD.
+        """Return the frames around a frame. None of them may be a CAN FD frame.
 
         Args:
             number: position of the frame in the log, from 1.
-            frames: number of frames before and after it.
+            frames: number of frames before and after the frame.
 
         Returns:
             The position of the first of these frames, and the frames in the order of the log.

@@ -1,4 +1,4 @@
-"""Rules against frames, one by one.
+"""Checks of rules against frames, one frame at a time.
 
 >>> from tickrig.wire.can import CanFrame
 >>> checker = Checker(Rules(no_emcy=True))
@@ -66,19 +66,19 @@ if TYPE_CHECKING:
 
 
 class Checker:
-    """Checks frames against rules.
+    """Checker that applies rules to frames.
 
-    Its memory grows with the number of identifiers, not with the number of frames.
+    The memory of the checker grows with the number of identifiers, not with the number of frames.
 
     Args:
-        rules: the rules. Rules that are written as expressions need decoded frames.
-        bit_rate: bits per second, for the load.
-        data_bit_rate: bits per second in the data phase of CAN FD frames with BRS; without it,
-            their data are counted at `bit_rate`.
+        rules: rules to check. Rules that are written as expressions need decoded frames.
+        bit_rate: bit rate in bits per second, used for the load.
+        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS.
+            Without it, the data of such frames are counted at `bit_rate`.
         eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
 
     Raises:
-        ValueError: a limit of the load without a bit rate.
+        ValueError: there is a limit of the load, but no bit rate.
     """
 
     def __init__(
@@ -101,8 +101,8 @@ class Checker:
         """Return violations in a frame, and in the second of the load that the frame completed.
 
         Args:
-            record: the frame.
-            decoded: the decoded frame, for rules that are expressions.
+            record: frame to check.
+            decoded: decoded frame, used by rules that are expressions.
         """
         if decoded is None or not self._expressions:
             return self._taken(record)
@@ -114,7 +114,7 @@ class Checker:
         return found
 
     def advance(self, now_us: int) -> list[TrafficFinding]:
-        """Return what has not come in time, where no frame tells the time."""
+        """Return overdue frames when no frame indicates the current time."""
         late = [rule for rule in self._expressions if rule.due_us < now_us]
         return [one for rule in late for one in rule.advance(now_us)]
 
@@ -145,12 +145,12 @@ class Checker:
         judged_us: int | None = None,
         errors: Iterable[str] = (),
     ) -> list[TrafficFinding]:
-        """Return what is missing at the end of the traffic.
+        """Return missing frames at the end of the traffic.
 
         Args:
             end_us: time when listening ended.
             lost: report of the source about lost frames and items that are not frames.
-            judged_us: time up to which expressions are judged; None for `end_us`.
+            judged_us: time up to which expressions are judged, or None for `end_us`.
             errors: report of the source about errors in addition to its error frames.
         """
         windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
@@ -160,16 +160,16 @@ class Checker:
         return found + self.advance(judged_us) + self._written_ended(judged_us)
 
     def missing(self, now_us: int) -> list[TrafficFinding]:
-        """Return what is missing until now; listening goes on."""
+        """Return missing frames up to now. Listening continues."""
         found = ended(self._rules, self._made, self._latest(), now_us, (), ())
         return found + self._written_ended(now_us)
 
     def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
-        """Return what the rules could not judge up to a time.
+        """Return the rules that could not be judged up to a time.
 
         Args:
             end_us: time when listening ended.
-            without_errors: why the source cannot contain error frames.
+            without_errors: reason why the source cannot contain error frames.
         """
         seen = {key: Seen(*values) for key, values in self._seen.items()}
         evidence = CheckedTraffic(seen, end_us, without_errors)
@@ -185,7 +185,7 @@ class Checker:
         return [one for rule in self._expressions for one in rule.end(end_us)]
 
     def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
-        """Return what is wrong with a second of a bus."""
+        """Return the violations in a second of a bus."""
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
 
@@ -215,7 +215,7 @@ def ended(  # noqa: PLR0913, PLR0917 - all that there is at the end
     lost: Iterable[str],
     errors: Iterable[str],
 ) -> list[TrafficFinding]:
-    """Return what rules miss at the end, and what the source says that they forbid."""
+    """Return the violations at the end: missing frames, and reports of the source."""
     found = [
         TrafficFinding(end_us, rule.name, text)
         for rule in made
@@ -227,11 +227,11 @@ def ended(  # noqa: PLR0913, PLR0917 - all that there is at the end
 
 
 class Unjudged(NamedTuple):
-    """What rules could not judge.
+    """Rules that could not be judged.
 
     Attributes:
-        rules: the reason for each rule that judged nothing, by its name.
-        notes: what the other rules could judge only in part.
+        rules: reason for each rule that judged nothing, by name of the rule.
+        notes: notes on rules that could be judged only in part.
     """
 
     rules: Mapping[str, str]
@@ -244,7 +244,7 @@ def unjudged(
     evidence: CheckedTraffic,
     written: Iterable[ExpressionRule] = (),
 ) -> Unjudged:
-    """Return what was not judged of a source that had a frame."""
+    """Return the rules that were not judged, for a source that had a frame."""
     why = [(rule.name, rule.unjudged(evidence)) for rule in made]
     why += [(rule.name, rule.unjudged(evidence)) for rule in written]
     if rules.max_load is not None:
@@ -274,7 +274,7 @@ _Shown = tuple[Record, Decoded]
 
 @dataclass(slots=True)
 class _Waiting:
-    """A finding, the frames that are shown with it, and how many more are wanted."""
+    """A finding, the frames that are shown with it, and the number of missing further frames."""
 
     finding: TrafficFinding
     around: list[_Shown]
@@ -282,10 +282,12 @@ class _Waiting:
 
 
 class Surroundings:
-    """Adds the frames before and after a finding to it; holds the finding until these arrive.
+    """Collector that adds the frames before and after a finding to it.
+
+    It holds findings until then.
 
     Args:
-        frames: number of frames before, and number of frames after.
+        frames: number of frames before, and number of frames after a finding.
         rules: names of the rules whose findings get these frames.
     """
 
@@ -297,7 +299,7 @@ class Surroundings:
     def take(
         self, record: Record, decoded: Decoded, found: Sequence[TrafficFinding]
     ) -> list[TrafficFinding]:
-        """Take a frame and what was found at it; return findings that wait no longer, in order."""
+        """Take a frame and its findings. Return findings that wait no longer, in order."""
         shown = record, decoded
         for one in self._waiting:
             if one.wanted:
@@ -309,7 +311,7 @@ class Surroundings:
         return self._complete()
 
     def flush(self, found: Sequence[TrafficFinding] = ()) -> list[TrafficFinding]:
-        """Return all that wait, and what was found where no frame came."""
+        """Return all waiting findings, and findings that belong to no frame."""
         for finding in found:
             self._add(finding, None)
         for one in self._waiting:
@@ -340,13 +342,13 @@ because this machine may not have read it yet.
 
 
 class DecodedCheck:
-    """Checks frames against rules; findings of expressions contain the frames around them.
+    """Check of frames against rules. Findings of expressions contain the frames around them.
 
     Args:
-        rules: the rules.
-        rates: bit rates of the buses, for the load.
-        decoder: decodes the frames; None if no rule needs that.
-        around: number of frames shown before and after a finding of such a rule.
+        rules: rules to check.
+        rates: bit rates of the buses, used for the load.
+        decoder: decoder of the frames, or None if no rule needs decoded frames.
+        around: number of frames shown before and after a finding of an expression.
         eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
     """
 
@@ -363,7 +365,7 @@ class DecodedCheck:
         self._latest_us = 0
 
     def take(self, records: Sequence[Record]) -> list[TrafficFinding]:
-        """Return what is wrong with frames."""
+        """Return the violations in frames."""
         checker, decoder = self._checker, self._decoder
         if decoder is None:
             return [finding for record in records for finding in checker.take(record)]
@@ -378,8 +380,9 @@ class DecodedCheck:
         """Return overdue frames, and findings that have waited too long, while no frame arrives.
 
         Args:
-            now_us: the time at the source, by the clock of this machine.
-            has_clock: whether the source uses that clock: a bus does, a pipe may not.
+            now_us: time at the source by the clock of this machine.
+            has_clock: whether the source uses the clock of this machine. A bus does, a pipe may
+                not.
         """
         if now_us - self._latest_us <= _QUIET_US:
             return []
@@ -389,11 +392,11 @@ class DecodedCheck:
     def end(
         self, end_us: int, lost: Iterable[str], judged_us: int, errors: Iterable[str]
     ) -> list[TrafficFinding]:
-        """Return what is missing, as `Checker.end` does."""
+        """Return missing frames, as `Checker.end` does."""
         return self._around.flush(self._checker.end(end_us, lost, judged_us, errors))
 
     def unjudged(self, end_us: int, without_errors: str) -> Unjudged:
-        """Return what was not judged, as `Checker.unjudged` does."""
+        """Return the rules that were not judged, as `Checker.unjudged` does."""
         return self._checker.unjudged(end_us, without_errors)
 
 
@@ -401,20 +404,20 @@ class DecodedCheck:
 
 
 RECENT_US: Final = 2_000_000
-"""A rule that a frame broke counts as broken for so long."""
+"""Time after a violation in which a rule counts as broken."""
 
 GRACE_US: Final = 2_000_000
-"""What has never come is missed only after so long."""
+"""Time after which a frame that has never come counts as missing."""
 
 LATE_US: Final = 1_000_000
-"""What has not come in time may still be on its way through this machine for so long."""
+"""Time in which a late frame may still be on its way through this machine."""
 
 KEPT: Final = 1_000
-"""Findings that are kept."""
+"""Number of findings that are kept."""
 
 
 class AlarmState(StrEnum):
-    """How a rule stands."""
+    """The state of a rule on display."""
 
     HOLDS = "holds"
     BROKEN = "BROKEN"
@@ -426,10 +429,10 @@ class Alarm:
     """The state of one rule.
 
     Attributes:
-        rule: its name.
-        count: number of findings; a lasting one counts once.
-        finding: the latest one.
-        lasting: whether the violation is that something is missing.
+        rule: name of the rule.
+        count: number of findings. A lasting violation counts once.
+        finding: latest finding of the rule.
+        lasting: whether the violation is a missing frame.
         acknowledged: whether the user has acknowledged the latest finding.
     """
 
@@ -440,7 +443,7 @@ class Alarm:
     acknowledged: bool = True
 
     def state(self, now_us: int) -> AlarmState:
-        """Return how it stands."""
+        """Return the state of the rule."""
         if self.finding is None:
             return AlarmState.HOLDS
         if self.lasting or now_us - self.finding.at_us < RECENT_US:
@@ -450,19 +453,19 @@ class Alarm:
 
 @dataclass(slots=True)
 class Alarms:
-    """Checks frames against rules as they arrive.
+    """Alarms that check frames against rules as the frames arrive.
 
     Args:
-        rules: the rules.
-        bit_rate: bits per second, for the load.
-        data_bit_rate: bits per second in the data phase of CAN FD frames with BRS.
+        rules: rules to check.
+        bit_rate: bit rate in bits per second, used for the load.
+        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS.
 
     Attributes:
-        findings: the latest, oldest first.
+        findings: latest findings. The oldest finding is first.
         judged: whether a frame was checked.
 
     Raises:
-        ValueError: a limit of the load without a bit rate.
+        ValueError: there is a limit of the load, but no bit rate.
     """
 
     rules: Rules
@@ -476,7 +479,7 @@ class Alarms:
     _lost: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
-        """Begin with rules that hold."""
+        """Begin with all rules unbroken."""
         self.clear()
 
     def clear(self) -> None:
@@ -487,17 +490,17 @@ class Alarms:
         self._begin_us, self.judged = None, False
 
     def take(self, record: Record, decoded: Decoded | None = None) -> None:
-        """Hold a frame, and what it says, against the rules."""
+        """Check a frame and its decoded content against the rules."""
         self.judged = True
         for finding in self._checker.take(record, decoded):
             self._found(finding)
 
     def check_missing(self, now_us: int, lost: int = 0) -> None:
-        """See what is missing now.
+        """Check which frames are missing now.
 
         Args:
-            now_us: the time of the frames.
-            lost: frames that were lost until now.
+            now_us: current time on the clock of the frames.
+            lost: number of frames lost until now.
         """
         if self._begin_us is None:
             self._lost = lost
@@ -516,7 +519,7 @@ class Alarms:
         self._miss(missing)
 
     def rows(self) -> list[Alarm]:
-        """Return all rules in their order."""
+        """Return the alarms of all rules in their order."""
         return list(self._alarms.values())
 
     def broken(self, now_us: int) -> int:
@@ -524,12 +527,12 @@ class Alarms:
         return sum(alarm.state(now_us) is AlarmState.BROKEN for alarm in self._alarms.values())
 
     def acknowledge(self) -> None:
-        """Take note of all that was broken."""
+        """Acknowledge all rules that were broken."""
         for alarm in self._alarms.values():
             alarm.acknowledged = True
 
     def _miss(self, missing: list[TrafficFinding]) -> None:
-        """Note what is missing: once, however long it lasts."""
+        """Record missing frames. A lasting violation is recorded once."""
         for alarm in self._alarms.values():
             finding = _joined([one for one in missing if one.rule == alarm.rule])
             if finding is None:
@@ -555,14 +558,14 @@ def _joined(findings: list[TrafficFinding]) -> TrafficFinding | None:
 
 RULE: Final = "RULE"
 _RULE_WIDTHS: Final = (20, 40)
-"""The first column, and how wide it is at least and at most."""
+"""The least and the greatest width of the first column."""
 
 _NO_FRAME: Final = "no frame"
-"""The state of a rule that does not hold yet: nothing came."""
+"""Text for the state of a rule that no frame has reached yet."""
 
 
 def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
-    """Return a line for each rule below a head, then the findings, the latest first."""
+    """Return a head, a line for each rule, and then the findings. The latest finding is first."""
     rows = alarms.rows()
     least, most = _RULE_WIDTHS
     width = min(most, max([least, *(len(alarm.rule) for alarm in rows)]))

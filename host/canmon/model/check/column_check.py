@@ -1,4 +1,7 @@
-"""Rules against a log in blocks: only frames that can break one are looked at; needs numpy."""
+"""Check of rules against a log in blocks. Only frames that can break a rule are examined.
+
+The module needs numpy.
+"""
 
 from __future__ import annotations
 
@@ -39,21 +42,21 @@ _Flags = npt.NDArray[np.bool_]
 _NEVER_US: Final = np.iinfo(np.int64).max
 
 _Placed = tuple[int, int, TrafficFinding]
-"""A finding with its row, and its place among those of the row: the order of `Checker`."""
+"""A finding with its row, and its place among findings of the row, in the order of `Checker`."""
 
 
 class ColumnChecker:
-    """Checks blocks of frames against rules; finds what `Checker` finds frame by frame.
+    """Checker of blocks of frames. It finds what `Checker` finds frame by frame.
 
-    Its memory grows with the number of identifiers, not with the number of frames.
+    The memory of the checker grows with the number of identifiers, not with the number of frames.
 
     Args:
-        rules: the rules.
-        bit_rate: bits per second, for the load.
+        rules: rules to check.
+        bit_rate: bit rate in bits per second, used for the load.
         eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
 
     Raises:
-        ValueError: a limit of the load without a bit rate.
+        ValueError: there is a limit of the load, but no bit rate.
     """
 
     def __init__(
@@ -67,7 +70,7 @@ class ColumnChecker:
         self._last_us, self._begun = 0, False
 
     def take(self, columns: Columns) -> list[TrafficFinding]:
-        """Return what is wrong with a block of frames, and with the seconds that they ended."""
+        """Return the violations in a block of frames, and in the seconds that they completed."""
         if len(columns) and not self._begun:
             self._begun = True
             for rule in self._made:
@@ -90,7 +93,7 @@ class ColumnChecker:
         return [finding for _, _, finding in placed]
 
     def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[TrafficFinding]:
-        """Return what is missing at the end of the traffic.
+        """Return missing frames at the end of the traffic.
 
         Args:
             lost: report of the source about lost frames and items that are not frames.
@@ -108,7 +111,7 @@ class ColumnChecker:
         return found + ended(self._rules, self._made, latest_us, self._last_us, lost, errors)
 
     def unjudged(self, without_errors: str = "") -> Unjudged:
-        """Return what was not judged; see `Checker.unjudged`."""
+        """Return the rules that were not judged; see `Checker.unjudged`."""
         seen = {
             (channel, ident): one
             for channel, selection in self._selections.items()
@@ -129,7 +132,7 @@ class ColumnChecker:
                 yield int(rows[plain[row]]), 0, TrafficFinding(window.at_us, limit.name, text)
 
     def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[_Placed]:
-        """Let the rules see selected frames, in the order of the log."""
+        """Apply the rules to selected frames, in the order of the log."""
         order = np.argsort(rows, kind="stable")
         rows, selected = rows[order], select(columns, rows[order])
         idents = np.where(selected.ident & ERROR, ERROR, selected.ident)
@@ -149,10 +152,10 @@ class ColumnChecker:
 
 
 class _BusSelection:
-    """Selects the frames of a bus that rules must see: by gaps, first bytes and positions.
+    """Selection of the frames of a bus that rules must see, by gaps, first bytes and positions.
 
     Args:
-        rules: the rules. Frames that are not selected cannot change their findings.
+        rules: rules that see the frames. Frames that are not selected cannot change their findings.
     """
 
     def __init__(self, rules: Sequence[Rule]) -> None:
@@ -164,7 +167,7 @@ class _BusSelection:
         self._frames = np.empty(0, np.int64)
 
     def take(self, frames: Columns) -> tuple[Ints, Ints]:
-        """Return the rows of selected frames and error frames, and the gap before each."""
+        """Return the rows of selected frames and error frames, and the gap before each row."""
         errors = frames.ident & ERROR != 0
         plain = np.flatnonzero(~errors)
         found = np.flatnonzero(errors) if self._errors else plain[:0]
@@ -180,7 +183,7 @@ class _BusSelection:
         return rows, np.concatenate((np.full(len(found), NO_GAP_US), gaps_us[places]))
 
     def seen(self) -> Iterable[tuple[int, Seen]]:
-        """Return the identifiers with the times of their frames."""
+        """Return the identifiers with the first and last time of their frames."""
         idents = self._idents
         values = zip(
             idents.first_us.tolist(), idents.last_us.tolist(), self._frames.tolist(), strict=True
@@ -188,7 +191,10 @@ class _BusSelection:
         return zip(idents.idents.tolist(), starmap(Seen, values), strict=True)
 
     def _extend(self, count: int) -> None:
-        """Ask the rules what they suspect of identifiers that are new; there are `count` now."""
+        """Ask the rules for their selections of new identifiers.
+
+        `count` is the new number of identifiers.
+        """
         before = len(self._all)
         self._below_us, self._above_us = grown(self._below_us, count), grown(self._above_us, count)
         self._all, self._firsts = grown(self._all, count), grown(self._firsts, count)

@@ -1,4 +1,4 @@
-"""What is wrong with the rhythm of frames that come again and again."""
+"""Violations of the rhythm of frames that are sent repeatedly."""
 
 # Theory of operation
 # ===================
@@ -38,21 +38,21 @@ else:  # an extra
 
 _WINDOW: Final = 8
 LEAST_GAPS: Final = 6
-"""So many gaps tell a period."""
+"""Number of gaps from which a period is known."""
 
 _SHORTEST_US: Final = 900
-"""A shorter period is a burst, or below what clocks of loggers can tell."""
+"""Shortest period. Shorter ones are bursts, or too short for the clocks of loggers."""
 _FLOOR_US: Final = 700
-"""Stamps of loggers are off by so much whatever the source does."""
+"""Error of the time stamps of loggers, whatever the source does."""
 _CALM: Final = 0.12
-"""Gaps that usually differ by more have no rhythm that could be judged."""
+"""Relative spread of gaps above which frames have no rhythm that can be judged."""
 _STEADY: Final = 0.15
 _SAME: Final = 0.12
 _NEAR: Final = 0.2
 _ON_LEVEL: Final = 0.6
 _MOST_LEVELS: Final = 5
 _MOST_ODD: Final = 0.12
-"""More odd gaps than this share are how the source is."""
+"""Share of odd gaps above which such gaps are normal for the source."""
 _LOST: Final = 1.65
 _NOISY: Final = 0.08
 _TIMES_NOISIER: Final = 4
@@ -60,16 +60,16 @@ _LEAST_NOISY: Final = 2
 _LEAST_QUIET: Final = 0.3
 _LEAST_AT_ONCE: Final = 64
 _FEW_RUNS: Final = 64
-"""More runs are found faster window by window."""
+"""Number of runs above which a search window by window is faster."""
 
 
 class _Level(NamedTuple):
-    """Gaps with one period.
+    """A series of gaps with one period.
 
     Attributes:
-        begin: the first gap.
-        end: one behind the last.
-        period_us: the period.
+        begin: index of the first gap.
+        end: index after the last gap.
+        period_us: period of the gaps.
     """
 
     begin: int
@@ -81,11 +81,11 @@ class Rhythm(NamedTuple):
     """The rhythm of the frames of an identifier.
 
     Attributes:
-        levels: the periods, in order; more than one if the period changed.
+        levels: periods in order. There is more than one if the period changed.
         missing: gaps in which frames are missing, each with the number of missing frames.
-        extra: surplus frames, between two frames that keep the period.
-        noisy: the first and last gap of each part with large jitter, and the usual and the large
-            jitter in us.
+        extra: surplus frames between two frames that keep the period.
+        noisy: first and last gap of each part with large jitter, and the usual and the large jitter
+            in us.
         spread_us: interquartile range of the gaps, in parts with usual jitter.
         share: fraction of the gaps that have the period.
     """
@@ -99,12 +99,12 @@ class Rhythm(NamedTuple):
 
     @property
     def period_us(self) -> int:
-        """The period that most gaps have."""
+        """The period of most gaps."""
         return max(self.levels, key=lambda one: one.end - one.begin).period_us
 
 
 def rhythm_of(times: Sequence[int]) -> Rhythm | None:
-    """Return the rhythm of frames from their times; None if they have no rhythm.
+    """Return the rhythm of frames from their times, or None if they have no rhythm.
 
     >>> rhythm_of([0, 10_000, 20_000, 30_000, 50_000, 60_000, 70_000, 80_000]).missing
     ((3, 1),)
@@ -146,7 +146,7 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
 
 
 def _gaps_of(times: Sequence[int]) -> Sequence[int]:
-    """Return the gaps between times; of an array of numpy an array."""
+    """Return the gaps between times. For an array of numpy, the gaps are an array."""
     if isinstance(times, list):
         return [b - a for a, b in pairwise(times)]
     found: Any = np.diff(np.asarray(times))  # an array is a sequence for all that is done here
@@ -154,11 +154,11 @@ def _gaps_of(times: Sequence[int]) -> Sequence[int]:
 
 
 class _Windows(NamedTuple):
-    """Each eight gaps: lists, or arrays of numpy.
+    """Windows of eight gaps each, as lists or arrays of numpy.
 
     Attributes:
-        middles: the medians.
-        spreads: the distances of the quartiles.
+        middles: median of each window.
+        spreads: distance of the quartiles of each window.
     """
 
     middles: Sequence[int]
@@ -181,7 +181,7 @@ class _Windows(NamedTuple):
 
 
 def _windows(gaps: Sequence[int]) -> _Windows:
-    """Return the median and the distance of the quartiles of each eight gaps."""
+    """Return the median and the distance of the quartiles of each window of eight gaps."""
     size = min(_WINDOW, len(gaps))
     low, middle, high = size // 4, size // 2, (3 * size) // 4
     if isinstance(gaps, list):
@@ -193,7 +193,7 @@ def _windows(gaps: Sequence[int]) -> _Windows:
 
 
 def _ranked(values: Sequence[int], place: int) -> int:
-    """Return the value that has a place in the order of all."""
+    """Return the value at a position in sorted order."""
     if isinstance(values, list):
         return int(sorted(values)[place])
     return int(np.partition(np.asarray(values), place)[place])
@@ -205,7 +205,7 @@ def _alike(one: float, other: float, usual: int) -> bool:
 
 
 def _are_alike(periods: Any, other: float, usual: int) -> Any:
-    """Return for each of an array of periods what `_alike` returns."""
+    """Return the result of `_alike` for each period of an array."""
     least = max(min(_FLOOR_US, other / 4), 2 * usual)
     return np.abs(periods - other) <= np.maximum(_SAME * np.maximum(periods, other), least)
 
@@ -216,9 +216,9 @@ def _is_steady(middle: int, spread: int) -> bool:
 
 
 def _runs(windows: _Windows, usual: int) -> list[list[int]]:
-    """Return runs of steady windows with the same median; noisy windows with it join a run.
+    """Return runs of steady windows with one median. Noisy windows with this median join a run.
 
-    Each run is a tuple: its first window, the window after its last one, and its median.
+    Each run is a tuple of its first window, the window after its last window, and its median.
     """
     runs: list[list[int]] = []
     begin = 0 if isinstance(windows.middles, list) else _array_runs(windows, usual, runs)
@@ -233,7 +233,7 @@ def _runs(windows: _Windows, usual: int) -> list[list[int]]:
 
 
 def _array_runs(windows: _Windows, usual: int, runs: list[list[int]]) -> int:
-    """Find runs in arrays as long as they are few; return the window that comes next."""
+    """Find runs in arrays as long as there are few runs. Return the next window."""
     middles, spreads = np.asarray(windows.middles), np.asarray(windows.spreads)
     limits = np.maximum(_STEADY * middles, np.minimum(_FLOOR_US, middles / 3))
     steady = (middles >= _SHORTEST_US) & (spreads <= limits)
@@ -263,7 +263,7 @@ def _array_runs(windows: _Windows, usual: int, runs: list[list[int]]) -> int:
 
 
 def _levels(windows: _Windows, gaps: int, usual: int) -> list[_Level]:
-    """Return the runs of windows that are no disturbance."""
+    """Return the runs of windows that are not a disturbance."""
     runs, count = _runs(windows, usual), len(windows.middles)
     # A single window between two of the same period is a disturbance, and no level.
     joined: list[list[int]] = []
@@ -286,11 +286,11 @@ def _levels(windows: _Windows, gaps: int, usual: int) -> list[_Level]:
 def _odd(
     gaps: Sequence[int], level: _Level, quiet: int
 ) -> tuple[list[tuple[int, int]], list[int], int]:
-    """Judge those gaps of a level that differ from its period.
+    """Judge the gaps of a level that differ from its period.
 
     Returns:
-        The gaps in which frames are missing, the surplus frames, and the number of frames that were
-        sent because of events.
+        The gaps in which frames are missing, the surplus frames, and the number of frames that
+        events triggered.
     """
     period = level.period_us
     off = max(_NEAR * period, 4 * quiet, min(_FLOOR_US, period / 3))
@@ -325,7 +325,7 @@ def _odd(
 
 
 def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float) -> list[int]:
-    """Return the places of gaps that are shorter or longer."""
+    """Return the positions of gaps that are shorter or longer than the period."""
     if isinstance(gaps, list):
         return [at for at in range(begin, end) if not low <= gaps[at] <= high]
     part = np.asarray(gaps[begin:end])
@@ -336,7 +336,7 @@ def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float)
 def _noisy(
     windows: _Windows, gaps: Sequence[int], period: int, quiet: int
 ) -> list[tuple[int, int, int, int]]:
-    """Return the runs of windows with a large jitter, where the others are quiet."""
+    """Return the runs of windows with a large jitter, if the other windows are quiet."""
     limit = max(_NOISY * period, 500, _TIMES_NOISIER * quiet)
     loud, count = windows.above(limit), len(windows.spreads)
     still = count - len(windows.above(max(limit / 3, 2 * quiet)))
@@ -369,7 +369,7 @@ def _noisy(
 
 
 def _both_ways(gaps: Sequence[int], begin: int, end: int, period: int, limit: float) -> bool:
-    """Return whether gaps are longer as often as shorter: events only make them shorter."""
+    """Return whether gaps are longer as often as shorter. Events make gaps only shorter."""
     part = [int(gap) for gap in gaps[begin:end]]
     longer = sum(gap > period + limit / 3 for gap in part)
     shorter = sum(gap < period - limit / 3 for gap in part)

@@ -1,4 +1,4 @@
-"""Demands on frames: how often, in which form, when, and with what values."""
+"""Demands on the frequency, form, time and values of frames."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tickrig.wire.instant import NEVER
 
 @dataclass(frozen=True, slots=True)
 class RuleEvent:
-    """Frames that pass a filter.
+    """The event of a rule, which is a frame that passes a filter.
 
     Attributes:
-        text: as written.
-        matches: returns whether a frame passes.
-        paths: the signals that it names.
-        is_signal: whether it is a single signal without a comparison.
-        has_node: whether it names a node.
+        text: text of the filter.
+        matches: function that returns whether a frame passes.
+        paths: signals that the filter names.
+        is_signal: whether the filter is a single signal without a comparison.
+        has_node: whether the filter names a node.
     """
 
     text: str
@@ -36,12 +36,12 @@ class RuleEvent:
     has_node: bool = False
 
     def carriers(self) -> Callable[[Decoded], bool]:
-        """Return a function that tells whether a frame carries a given signal."""
+        """Return a function that returns whether a frame carries a given signal."""
         finders = [signal_reader(path) for path in self.paths]
         return lambda decoded: any(find(decoded) is not None for find in finders)
 
     def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
-        """Return what finds the value of a frame: the signal, or the first one of its kind."""
+        """Return a function that finds the value of a frame, or the first value of its kind."""
         matches = self.matches
         if self.is_signal:
             finders = [signal_reader(path) for path in self.paths]
@@ -54,17 +54,17 @@ class RuleEvent:
 EVERY: Final = RuleEvent("all frames", lambda record, decoded: True)
 
 _Sender = tuple[str, int]
-"""A bus and an identifier on it."""
+"""A bus, and an identifier on this bus."""
 
 
 def _sender_of(record: Record) -> _Sender:
-    """Return where a frame came from; error frames are one."""
+    """Return the sender of a frame. All error frames have the same sender."""
     frame = record.frame
     return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
 
 
 def _said(decoded: Decoded) -> str:
-    """Write what a frame says, for a finding."""
+    """Return the meaning of a frame as text for a finding."""
     node = "" if decoded.node is None else f" of node {decoded.node}"
     return f"{decoded.kind}{node}: {decoded.text}".removesuffix(": ")
 
@@ -76,9 +76,9 @@ class RuleBreach(NamedTuple):
     """A violation and its time.
 
     Attributes:
-        at_us: when it was seen.
-        text: what is wrong, in words.
-        record: the frame that shows it, None if none does.
+        at_us: time at which the violation was detected.
+        text: description of the violation.
+        record: frame that shows the violation, or None if no frame does.
     """
 
     at_us: int
@@ -87,16 +87,18 @@ class RuleBreach(NamedTuple):
 
 
 class RuleDemand:
-    """One demand; this base class is always met.
+    """One demand of a rule. This base class is always met.
 
-    Its memory grows at most with the number of identifiers.
+    The memory of a demand grows at most with the number of identifiers.
 
     Attributes:
-        due_us: time by which something must have arrived.
-        came: whether a frame that the demand counts has arrived; False if it counts no frames.
-        judged: whether something was compared with the demand.
-        timed: whether the demand is about time; nothing is judged if all frames have the same time.
-        doubt: why nothing was judged; empty if something was.
+        due_us: time by which a frame must have arrived.
+        came: whether a frame that the demand counts has arrived. It is False if the demand counts
+            no frames.
+        judged: whether a frame was compared with the demand.
+        timed: whether the demand is about time. Such a demand judges nothing if all frames have the
+            same time.
+        doubt: reason why nothing was judged, empty if something was judged.
     """
 
     due_us: int = NEVER
@@ -106,25 +108,25 @@ class RuleDemand:
     doubt: str = "no frame came while it was in force"
 
     def begin(self, at_us: int) -> None:
-        """Start, or start again after a pause."""
+        """Start, also after a pause."""
 
     def pause(self) -> None:
-        """Demand nothing until `begin`."""
+        """Stop the demand until `begin`."""
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Return what is wrong with a frame."""
+        """Return the violation in a frame."""
         return None
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Return what has not come until `due_us`, once."""
+        """Return a frame that has not arrived until `due_us`, once."""
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Return what is missing at the end.
+        """Return missing frames at the end.
 
         Args:
             end_us: the end of the traffic, or the current time if it continues.
-            running: whether the scope holds.
+            running: whether the scope of the rule applies.
         """
         return ()
 
@@ -132,16 +134,16 @@ class RuleDemand:
 # Demands on how often something comes.
 
 MOST_COUNTED: Final = 10_000
-"""So many frames of a time may be allowed: their times are kept."""
+"""Largest number of frames that a rule may allow in a span, because their times are kept."""
 
 
 class Truth(RuleDemand):
-    """A condition on signals that must never hold, or always.
+    """A condition on signals that must never be true, or always.
 
     A violation is reported when it starts, not with each frame.
 
     Args:
-        event: the condition.
+        event: condition on signals.
         wanted: required value of the condition.
     """
 
@@ -151,11 +153,11 @@ class Truth(RuleDemand):
         self.doubt = f"nothing with {event.text} came while it was in force"
 
     def pause(self) -> None:
-        """Tell it again."""
+        """Allow the violation to be reported again."""
         self._wrong.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare the condition."""
+        """Compare the condition with its required value."""
         if not self._carries(decoded):
             return None
         self.judged = True
@@ -169,17 +171,17 @@ class Truth(RuleDemand):
 
 
 class Never(RuleDemand):
-    """No such frame may come; each one is reported.
+    """Demand that no such frame arrives. Each such frame is reported.
 
     Args:
-        event: the frames.
+        event: frames that must not arrive.
     """
 
     def __init__(self, event: RuleEvent) -> None:
         self._matches = event.matches
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Tell it."""
+        """Report the frame."""
         self.judged = True
         return _said(decoded) if self._matches(record, decoded) else None
 
@@ -188,9 +190,9 @@ class Count(RuleDemand):
     """A limit of the number of frames.
 
     Args:
-        event: the frames.
-        least: smallest number; reported at the end.
-        most: largest number; None for no limit. An excess is reported once.
+        event: frames to count.
+        least: smallest allowed number. Too few frames are reported at the end.
+        most: largest allowed number, or None for no limit. An excess is reported once.
     """
 
     def __init__(self, event: RuleEvent, least: int, most: int | None) -> None:
@@ -209,7 +211,7 @@ class Count(RuleDemand):
         )
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Report that too few came."""
+        """Report too few frames."""
         if self._count < self._least:
             came = f"{self._event.text} came {counted(self._count, 'time')}"
             yield f"{came}, at least {self._least} is right"
@@ -219,9 +221,9 @@ class Rate(RuleDemand):
     """A limit of the number of frames in any span of time.
 
     Args:
-        event: the frames.
-        most: largest number, up to `MOST_COUNTED`.
-        span_us: length of the span.
+        event: frames to count.
+        most: largest allowed number, up to `MOST_COUNTED`.
+        span_us: length of the span of time.
     """
 
     timed = True
@@ -231,7 +233,10 @@ class Rate(RuleDemand):
         self._times_us: deque[int] = deque(maxlen=most + 1)
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Check the time since the frame that must be outside of the span; then count again."""
+        """Check the time since the frame that must be outside of the span.
+
+        After a report, count again.
+        """
         self.judged = True
         if not self._event.matches(record, decoded):
             return None
@@ -258,20 +263,20 @@ _LENGTHS: Final = {
     "guard": (1,),
     "lss": (8,),
 }
-"""Bytes of the data frames of a kind (CiA 301; CiA 305)."""
+"""Number of bytes of data frames by kind (CiA 301, CiA 305)."""
 
 
 _NodeOnBus = tuple[str, int | None]
-"""A bus and a node."""
+"""A bus, and a node on this bus."""
 
 
 class Dlc(RuleDemand):
-    """Frames must have the length in CiA 301, or of the mapping of a PDO; not remote frames.
+    """Demand on the length of frames, by CiA 301 or the mapping of a PDO.
 
-    A PDO with an unknown mapping is not judged.
+    A PDO with an unknown mapping and remote frames are not judged.
 
     Args:
-        event: the frames.
+        event: frames to judge.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -279,7 +284,7 @@ class Dlc(RuleDemand):
         self.doubt = f"no frame of {event.text} came whose length is known"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare the length."""
+        """Compare the length of a frame."""
         frame = record.frame
         if not isinstance(frame, CanFrame) or frame.remote:
             return None
@@ -297,7 +302,7 @@ class Dlc(RuleDemand):
 
 
 _UNASKED: Final = 2
-"""So many heartbeats without a request: the node produces them, and answers none."""
+"""Number of heartbeats without a request, after which the node is a producer of heartbeats."""
 
 
 @dataclass(slots=True)
@@ -305,8 +310,8 @@ class _Guarding:
     """The state of node guarding of a node.
 
     Attributes:
-        last: toggle bit of its latest answer; None before the first.
-        requested: whether a request has no answer yet; None before the first request.
+        last: toggle bit of the latest answer, or None before the first answer.
+        requested: whether a request has no answer yet. It is None before the first request.
     """
 
     last: int | None = None
@@ -314,13 +319,15 @@ class _Guarding:
 
 
 class Toggle(RuleDemand):
-    """The toggle bit of node guarding must change with each answer; after a boot-up it is 0.
+    """Demand that the toggle bit of node guarding changes with each answer.
+
+    It is 0 after a boot-up.
 
     An answer is a frame after a request. If a log has no requests, all frames after a frame with
     the toggle bit set count as answers. A node that produces heartbeats sends no answers.
 
     Args:
-        event: the answers, including those of a node that was guarded before.
+        event: answers, including answers of a node that was guarded before.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -330,12 +337,12 @@ class Toggle(RuleDemand):
         self.doubt = f"no two answers of {event.text} to guarding came"
 
     def begin(self, at_us: int) -> None:
-        """Forget what was before."""
+        """Clear the states of all nodes."""
         self._nodes.clear()
         self._unasked.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare the bit with the one before."""
+        """Compare the toggle bit with the previous one."""
         frame, key = record.frame, (record.channel, decoded.node)
         if decoded.kind == "boot-up":
             self._boot(key)
@@ -358,7 +365,10 @@ class Toggle(RuleDemand):
             self._nodes[key] = _Guarding(1, requested)
 
     def _is_answer(self, key: _NodeOnBus, node: _Guarding | None, toggle: int) -> bool:
-        """Return whether a frame with this bit answers a request; the request is then done."""
+        """Return whether a frame with this toggle bit answers a request.
+
+        The request is then settled.
+        """
         requested = False if node is None else node.requested
         if node is not None and requested:
             node.requested = False
@@ -380,12 +390,14 @@ class Toggle(RuleDemand):
 
 
 class Every(RuleDemand):
-    """Frames of an identifier must repeat in time; the first one after a boot-up may be late.
+    """Demand on the time between frames of an identifier.
+
+    The first frame after a boot-up may be late.
 
     Args:
-        event: the frames.
+        event: frames to judge.
         low_us: shortest time from the previous frame.
-        high_us: longest time from the previous frame; None for no limit.
+        high_us: longest time from the previous frame, or None for no limit.
     """
 
     timed = True
@@ -396,11 +408,11 @@ class Every(RuleDemand):
         self._last: dict[_Sender, tuple[int, int | None]] = {}
 
     def begin(self, at_us: int) -> None:
-        """Measure from the next frame."""
+        """Measure the time from the next frame."""
         self._last.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare the gap."""
+        """Compare the time since the previous frame."""
         if decoded.kind == "boot-up":
             self._forget(record.channel, decoded.node)
         if not self._event.matches(record, decoded):
@@ -416,7 +428,7 @@ class Every(RuleDemand):
         return self._wrong(gap_us, decoded.node, "after the one before")
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Report that it stopped or never came."""
+        """Report that the frames stopped or never arrived."""
         if not running or self._high_us is None:
             return
         if not self.came:
@@ -440,10 +452,10 @@ class Every(RuleDemand):
 
 
 class FirstWithin(RuleDemand):
-    """A frame must arrive in time after the beginning of the traffic or of the scope.
+    """Demand for a frame within a time after the beginning of the traffic or of the scope.
 
     Args:
-        event: the frame.
+        event: frame that must arrive.
         most_us: longest time until the frame.
     """
 
@@ -454,7 +466,7 @@ class FirstWithin(RuleDemand):
         self.doubt = f"it ends before {ms_text(most_us)} ms have passed, without {event.text}"
 
     def begin(self, at_us: int) -> None:
-        """Wait for it."""
+        """Wait for the frame."""
         self.due_us = at_us + self._most_us
 
     def pause(self) -> None:
@@ -462,26 +474,26 @@ class FirstWithin(RuleDemand):
         self.due_us = NEVER
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """See whether it has come."""
+        """Check whether the frame has arrived."""
         if self.due_us != NEVER and self._event.matches(record, decoded):
             self.due_us, self.judged = NEVER, True
         return None
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Report that it has not come."""
+        """Report that the frame has not arrived."""
         due_us, self.due_us, self.judged = self.due_us, NEVER, True
         yield RuleBreach(due_us, f"no {self._event.text} in {ms_text(self._most_us)} ms")
 
 
 _Pair = tuple[str, int | None]
-"""A bus, and a node if it relates the events."""
+"""A bus, and a node if the node relates the events."""
 
 
 class DeadlineDemand(RuleDemand):
-    """Something comes in time after each frame that it belongs to.
+    """Demand for a reaction within a time after each frame that requires it.
 
     Args:
-        most_us: how long it may take.
+        most_us: longest time until the reaction.
     """
 
     timed = True
@@ -491,7 +503,7 @@ class DeadlineDemand(RuleDemand):
         self._open: dict[_Pair, tuple[Record, str]] = {}
 
     def begin(self, at_us: int) -> None:
-        """Wait for nothing yet."""
+        """Begin without an open deadline."""
         self._close_all()
 
     def pause(self) -> None:
@@ -499,7 +511,7 @@ class DeadlineDemand(RuleDemand):
         self._close_all()
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Report what has not come."""
+        """Report frames that have not arrived."""
         due_us, self.judged = self.due_us, True
         late = [pair for pair, (record, _) in self._open.items() if self._due(record) <= due_us]
         for pair in late:
@@ -527,14 +539,14 @@ class DeadlineDemand(RuleDemand):
 
 
 class Latency(DeadlineDemand):
-    """One event must follow another in time.
+    """Demand for an event within a time after another event.
 
     If the first event occurs again before the second one, time counts from its earlier occurrence.
     If the events name no node, both must come from frames of the same node.
 
     Args:
-        first: the event that starts the time.
-        second: the event that must follow.
+        first: event that starts the time.
+        second: event that must follow.
         most_us: longest time between them.
     """
 
@@ -545,7 +557,7 @@ class Latency(DeadlineDemand):
         self.doubt = f"no {first.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Close what has followed, then begin."""
+        """Close the deadlines that the frame meets, then begin new ones."""
         node = decoded.node if self._by_node else None
         if self._second.matches(record, decoded):
             self._close((record.channel, node))
@@ -556,12 +568,12 @@ class Latency(DeadlineDemand):
 
 
 class Answered(DeadlineDemand):
-    """Requests of an SDO client, and of a master with node guarding, must be answered in time.
+    """Demand for an answer within a time after a request of an SDO client or a guarding master.
 
     For a repeated request, time counts from the first one.
 
     Args:
-        event: the requests.
+        event: requests of clients and masters.
         most_us: longest time until the answer.
     """
 
@@ -571,7 +583,7 @@ class Answered(DeadlineDemand):
         self.doubt = f"no request of {event.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Close what is answered, or left for another request; then begin."""
+        """Close the deadlines of requests that are answered or replaced, then begin new ones."""
         is_sdo = decoded.kind == "sdo"
         if not (is_sdo or decoded.kind in ("guard", "heartbeat", "boot-up")):
             return None
@@ -595,8 +607,8 @@ class Values:
     """A set of valid values.
 
     Attributes:
-        text: as written.
-        holds: returns whether a signal has one of them.
+        text: text of the set in the rule.
+        holds: function that returns whether a signal has one of the values.
     """
 
     text: str
@@ -604,14 +616,14 @@ class Values:
 
 
 class In(RuleDemand):
-    """A value must be one of the valid values.
+    """Demand that a value is one of the valid values.
 
     For a signal, a violation is reported when it starts. For other events, it is reported for each
     frame. An EMCY with code 0000h clears an error, and is valid.
 
     Args:
-        event: a signal, or a kind of frames; of these the first value counts.
-        values: the valid values.
+        event: signal, or kind of frames. For a kind of frames, the first value counts.
+        values: set of valid values.
     """
 
     def __init__(self, event: RuleEvent, values: Values) -> None:
@@ -621,11 +633,11 @@ class In(RuleDemand):
         self._wrong: set[_Sender] = set()
 
     def pause(self) -> None:
-        """Tell it again."""
+        """Allow the violation to be reported again."""
         self._wrong.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare the value."""
+        """Compare the value with the valid values."""
         signal = self._value_of(record, decoded)
         if signal is None:
             return None
@@ -641,10 +653,10 @@ class In(RuleDemand):
 
 
 class Follow(RuleDemand):
-    """Each value is compared with the one before it, of the same identifier.
+    """Demand that compares each value with the previous value of the same identifier.
 
     Args:
-        event: as of `In`.
+        event: event with the meaning of `In.event`.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -653,11 +665,11 @@ class Follow(RuleDemand):
         self.doubt = f"no two values of {event.text} came from one sender while it was in force"
 
     def begin(self, at_us: int) -> None:
-        """Forget what was before."""
+        """Clear the previous values."""
         self._last.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare it; a boot-up restarts the comparison."""
+        """Compare the value. A boot-up restarts the comparison."""
         if decoded.kind == "boot-up":
             self._last = {
                 sender: last
@@ -678,7 +690,7 @@ class Follow(RuleDemand):
 
 
 class Counts(Follow):
-    """A counter goes up by one, and round to 0 or 1 from the highest value that it had."""
+    """Demand that a counter increases by one. From its highest value, it continues with 0 or 1."""
 
     def __init__(self, event: RuleEvent) -> None:
         super().__init__(event)
@@ -697,8 +709,8 @@ class Steps(Follow):
     """A limit of the change of a value from one frame to the next.
 
     Args:
-        event: as for `In`.
-        most: the largest change.
+        event: event with the meaning of `In.event`.
+        most: largest allowed change.
     """
 
     def __init__(self, event: RuleEvent, most: float) -> None:
@@ -714,11 +726,11 @@ class Steps(Follow):
 
 
 class Changes(RuleDemand):
-    """A value must change within a time; a violation is reported once.
+    """Demand that a value changes within a time. A violation is reported once.
 
     Args:
-        event: as for `In`.
-        most_us: how long it may stay the same.
+        event: event with the meaning of `In.event`.
+        most_us: longest time without a change.
     """
 
     timed = True
@@ -729,11 +741,11 @@ class Changes(RuleDemand):
         self._since: dict[_Sender, tuple[object, int, bool]] = {}
 
     def begin(self, at_us: int) -> None:
-        """Forget what was before."""
+        """Clear the previous values."""
         self._since.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare it with the one before."""
+        """Compare the value with the previous value."""
         signal = self._value_of(record, decoded)
         if signal is None:
             return None

@@ -1,4 +1,4 @@
-r"""Rules learnt from a good log, written as TOML, and their violations in another log.
+r"""Rules that are learnt from a good log, written as TOML, and compared with another log.
 
 >>> rules = parse_learnt('[learnt.can0.frame.185]\nlengths = [6]\nperiod = "10ms±20%"\n')
 >>> rules["can0"].frames[0x185].period
@@ -30,7 +30,7 @@ RULES: Final = {
     "learnt-load": "more bits a second than before",
     "learnt-order": "another order of boot-ups",
 }
-"""Rules beside those that need no parameter, and what each finds."""
+"""Descriptions of the rules in addition to the rules without parameters."""
 
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 """Sub-indices 1 to 4 of 1018h."""
@@ -46,7 +46,7 @@ _PERIOD: Final = re.compile(r"([^±+]+)(?:±|\+-)([0-9]{1,3})%")
 _MOST_USUAL: Final = 50
 _HEARTBEAT: Final = 0x700
 KEPT_FRAMES: Final = 1_000
-"""So many frames of a finding are kept."""
+"""Number of frames that are kept of a finding."""
 
 
 class FrameSummary(NamedTuple):
@@ -54,16 +54,16 @@ class FrameSummary(NamedTuple):
 
     Attributes:
         ident: CAN-ID with flags.
-        name: name for display.
-        rows: rows of all these frames.
-        pieces: rows between two changes of the rhythm, if these are enough to find a rhythm.
-        lengths: bytes of data.
-        kind: cyclic, sync or event.
-        period_us: period of the frames; None if they have no rhythm.
+        name: name of the identifier for display.
+        rows: rows of all frames of the identifier.
+        pieces: rows between two changes of the rhythm, if the rows are enough to find a rhythm.
+        lengths: numbers of data bytes that occur.
+        kind: kind of the frames, which is cyclic, sync or event.
+        period_us: period of the frames, or None if they have no rhythm.
         jitter_us: interquartile range of the gaps.
         few: whether the frames are too few to find a rhythm.
         irregular: whether the frames have no rhythm.
-        service: NMT, EMCY, SDO or error control.
+        service: service of the frames, which is NMT, EMCY, SDO or error control.
     """
 
     ident: int
@@ -83,9 +83,9 @@ class NodeSummary(NamedTuple):
     """The traffic of a node.
 
     Attributes:
-        row: row of its first frame.
-        identity: the values of 1018h in SDO traffic, None for unknown ones.
-        emcy: error codes of its EMCYs, such as 8130h.
+        row: row of the first frame of the node.
+        identity: values of 1018h in SDO traffic, with None for unknown values.
+        emcy: error codes of the node's EMCY messages, such as 8130h.
         answers: rows of the SDO answers with the identity, by sub-index.
     """
 
@@ -97,18 +97,19 @@ class NodeSummary(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BusSummary:
-    """What is usual on a bus.
+    """The usual traffic on a bus.
 
     Attributes:
         name: name of the bus.
-        frames: by identifier.
-        nodes: by node-ID.
-        boot_order: node-IDs in the order of their first boot-ups; those within 100 ms together.
-        boots: rows of these boot-ups.
-        bits_per_second: load of the busiest half second.
+        frames: frames by identifier.
+        nodes: nodes by node-ID.
+        boot_order: node-IDs in the order of the first boot-ups. Nodes that boot within 100 ms are
+            in one group.
+        boots: rows of these first boot-ups.
+        bits_per_second: load of the busiest half second in bits per second.
         busy: rows of the first and last frame in a half second with too many bits, or else in the
-            busiest one.
-        found: findings of rules that need no parameter, as texts.
+            busiest half second.
+        found: findings of rules without parameters, as texts.
     """
 
     name: str
@@ -125,10 +126,10 @@ class _LearntFrame(NamedTuple):
     """Requirements for the frames of an identifier.
 
     Attributes:
-        lengths: allowed numbers of data bytes; empty for any.
-        kind: cyclic, sync or event.
-        period: period and its tolerance, both in us; None for any period.
-        jitter_us: interquartile range of the gaps; None for any.
+        lengths: allowed numbers of data bytes, empty for any number.
+        kind: kind of the frames, which is cyclic, sync or event.
+        period: period and tolerance of the period in us, or None for any period.
+        jitter_us: interquartile range of the gaps, or None for any.
         required: whether the frames must be present.
     """
 
@@ -140,11 +141,11 @@ class _LearntFrame(NamedTuple):
 
 
 class _LearntNode(NamedTuple):
-    """What a node must keep.
+    """Requirements for a node.
 
     Attributes:
-        identity: of 1018h; None for any.
-        emcy: error codes that are usual.
+        identity: values of 1018h, or None for any.
+        emcy: error codes that are usual for the node.
     """
 
     identity: tuple[int | None, ...] = (None,) * len(IDENTITY)
@@ -156,11 +157,11 @@ class LearntBus:
     """Requirements for a bus; see `BusSummary`.
 
     Attributes:
-        frames: by identifier.
-        nodes: by node-ID.
-        boot_order: groups of node-IDs.
-        bits_per_second: largest load; None for no limit.
-        usual: findings that are usual on this bus, and are not reported.
+        frames: requirements for frames by identifier.
+        nodes: requirements for nodes by node-ID.
+        boot_order: groups of node-IDs in the order of their boot-ups.
+        bits_per_second: largest load in bits per second, or None for no limit.
+        usual: findings that are usual on this bus, and therefore not reported.
         others: whether other CAN-IDs than those in `frames` are allowed.
     """
 
@@ -181,17 +182,17 @@ class LearntBus:
 
 
 Learnt = Mapping[str, LearntBus]
-"""What buses must keep, by their names."""
+"""Requirements for buses, by name of the bus."""
 
 
 def usual_text(hit: Hit) -> str:
-    """Write a finding as a rule file has it among what is usual."""
+    """Return a finding in the notation of usual findings in a rule file."""
     where = f"node {hit.node}: " if hit.node is not None else ""
     return f"{hit.rule}: {where}{hit.text}"
 
 
 def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
-    """Return the rules of a bus; where there is one bus only, its name does not count."""
+    """Return the rules of a bus. If there is only one bus, its name does not matter."""
     if len(learnt) == buses == 1:
         return next(iter(learnt.values()))
     return learnt.get(name)
@@ -201,7 +202,7 @@ def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
 
 
 def learnt_text(summaries: Iterable[BusSummary], head: Sequence[str]) -> str:
-    """Write rules as TOML.
+    """Return rules as TOML.
 
     Args:
         summaries: summaries of all buses of the good log.
@@ -249,12 +250,12 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
 def scanned_text(
     bus: str, nodes: Mapping[int, tuple[Sequence[int | None], int | None]], head: Sequence[str]
 ) -> str:
-    """Write the values that were read from nodes as rules.
+    """Return the values that were read from nodes as rules.
 
     Args:
         bus: name of the bus.
-        nodes: by node-ID, 1018h:01 to 04 and the producer heartbeat time in ms.
-        head: lines of the comment at the beginning.
+        nodes: values of 1018h:01 to 04 and producer heartbeat time in ms, by node-ID.
+        head: lines of the comment at the beginning of the file.
     """
     table = f"learnt.{_key(bus)}"
     lines = [f"# {one}" for one in head]
@@ -286,10 +287,10 @@ def _time(us: int) -> str:
 
 
 def parse_learnt(text: str) -> Learnt | None:
-    """Read learnt rules; return None if the file has other rules.
+    """Read learnt rules. Return None if the file has other rules.
 
     Raises:
-        ValueError: an error in the file; the message names its place.
+        ValueError: the file has an error. The message names the place of the error.
     """
     words = load_toml(text)
     if "learnt" not in words:
@@ -429,8 +430,8 @@ def broken(
     Args:
         learnt: requirements for the bus.
         bus: summary of the bus.
-        frames: all frames of the bus; the last one is shown if something is missing.
-        times: times of these frames.
+        frames: all frames of the bus. The last frame is shown if something is missing.
+        times: times of the frames.
     """
     last_row = len(frames) - 1
     for node in sorted(learnt.nodes.keys() - bus.nodes.keys()):
@@ -500,10 +501,10 @@ def _frame_broken(
 def _odd_rows(
     pieces: Sequence[Sequence[int]], times: Sequence[int], period: int, off: int
 ) -> tuple[int, ...]:
-    """Return the rows after gaps that a period does not allow, if there are at least two.
+    """Return the rows after gaps that a period does not allow, if there are at least two such rows.
 
-    A single such gap at first comes from a late or lost frame; it is not the start of another
-    period.
+    A single such gap at the beginning is caused by a late or lost frame, and is not the start of
+    another period.
     """
     ends = (pair for piece in pieces for pair in pairwise(piece))
     gaps = [(abs(times[row] - times[before] - period) > off, int(row)) for before, row in ends]
@@ -513,7 +514,7 @@ def _odd_rows(
 
 
 def _order_broken(order: Sequence[Sequence[int]], boots: Mapping[int, int]) -> Iterator[Hit]:
-    """Compare the order of boot-ups, where all nodes boot."""
+    """Compare the order of boot-ups, if all nodes boot."""
     if not order or not all(node in boots for group in order for node in group):
         return
     latest, row = -1, -1

@@ -1,4 +1,4 @@
-"""The services of CANopen nodes in a log: NMT, error control, EMCY and SDO."""
+"""The services of CANopen nodes in a log, which are NMT, error control, EMCY and SDO."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ _TARGETS: Final = {
     int(nmt.NmtCommand.ENTER_PRE_OPERATIONAL): int(nmt.NmtState.PRE_OPERATIONAL),
 }
 _ANSWER_US: Final = 50_000
-"""A frame of error control answers a remote frame that came at most so long before."""
+"""Longest time from a remote frame to the error control frame that answers it."""
 _PATIENCE_US: Final = 1_000_000
-"""An SDO request at the end of a log may still be answered for so long."""
+"""Time in which an SDO request at the end of a log may still be answered."""
 _OBEYS_US: Final = 1_000_000
-"""A node follows an NMT command within so long."""
+"""Time within which a node follows an NMT command."""
 _PDO_PARAMETERS: Final = range(0x1400, 0x1C00)
 _SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
 _HEARTBEAT_TIME: Final = 0x1017
@@ -64,15 +64,15 @@ RULES: Final = {
     "sdo-unanswered": "SDO requests without an answer",
     "sdo-toggle": "an SDO segment with a wrong toggle bit",
 }
-"""The rules that are judged here, and what each finds."""
+"""Descriptions of the rules that this module judges, by name."""
 
 
 class Cut(NamedTuple):
-    """An event that changes the rhythm of frames: rhythms learnt before it are not valid after it.
+    """An event that changes the rhythm of frames. Rhythms learnt before it are not valid after it.
 
     Attributes:
         at_us: time of the event.
-        node: node whose frames change; 0 for all nodes.
+        node: node whose frames change, or 0 for all nodes.
     """
 
     at_us: int
@@ -84,13 +84,13 @@ class NodeEvents:
     """The traffic of one node.
 
     Attributes:
-        heartbeats: rows of error control without a request, without boot-ups.
-        answers: rows of error control after a request.
-        requested: rows of remote frames of error control.
+        heartbeats: rows of error control frames without a request, except boot-ups.
+        answers: rows of error control frames after a request.
+        requested: rows of remote frames for error control.
         boots: rows of boot-ups.
-        toggled: whether a frame had the toggle bit.
-        state: the last reported NMT state; None before the first.
-        identity: values read from 1018h and the row of their first answer, by sub-index.
+        toggled: whether an error control frame had the toggle bit set.
+        state: last reported NMT state, or None before the first report.
+        identity: values read from 1018h, each with the row of its first answer, by sub-index.
     """
 
     heartbeats: list[int] = field(default_factory=list)
@@ -111,7 +111,7 @@ class NodeEvents:
 
 
 def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
-    """Return whether the protocol of a bus is CANopen.
+    """Return whether a bus uses the protocol CANopen.
 
     Other protocols use the same CAN-IDs for other purposes. Therefore each kind of identifier is
     checked. Frames with the right length and content count for CANopen, other frames count against
@@ -165,19 +165,19 @@ def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) 
 
 
 class BusEvents:
-    """Walks through the frames of services, and collects their content.
+    """Examination of the service frames of a bus, one by one, which collects their content.
 
     Args:
-        bus: the frames.
-        times: their times.
-        decoder: reassembles SDO transfers, and learns from them.
+        bus: frames of the bus.
+        times: times of the frames.
+        decoder: decoder that reassembles SDO transfers, and learns from them.
         rows: rows of each identifier.
 
     Attributes:
-        nodes: the traffic by node-ID.
-        hits: the findings.
+        nodes: traffic of each node by node-ID.
+        hits: findings of the examination.
         cuts: changes of the rhythm of frames.
-        commanded: whether an NMT command came.
+        commanded: whether the log contains an NMT command.
     """
 
     def __init__(
@@ -235,7 +235,7 @@ class BusEvents:
             self._latest_sdo[node] = row
 
     def end(self, end_us: int) -> None:
-        """Judge what is known once all frames were taken."""
+        """Judge the results that are known after all frames."""
         for transfer in self._decoder.pending(end_us):
             if transfer.duration_us > _PATIENCE_US or WRONG_TOGGLE in transfer.flaws:
                 self._transfer(end_us, transfer)
@@ -335,7 +335,7 @@ class BusEvents:
             one.command = None
 
     def _guarding(self, node: int, one: NodeEvents) -> None:
-        """Compare toggle bits of answers that follow each other."""
+        """Compare the toggle bits of successive answers."""
         before: int | None = None
         boots = iter([*one.boots, len(self._bus)])
         boot = next(boots)
@@ -354,7 +354,7 @@ class BusEvents:
     # SDO
 
     def _answer(self, at_us: int, node: int, data: bytes) -> None:
-        """Notice an answer that comes twice."""
+        """Report an answer that arrives twice."""
         one = self.nodes[node]
         latest, one.latest_answer = one.latest_answer, (at_us, data, one.requests)
         blocks = one.latest_request[:1] >= b"\xa0"
@@ -372,7 +372,7 @@ class BusEvents:
             )
 
     def _transfer(self, at_us: int, transfer: decoded.Transfer) -> None:
-        """Judge an SDO transfer that ended."""
+        """Judge a completed SDO transfer."""
         node = transfer.node
         ident = sdo_frame.REQUEST_COB_ID + node
         row = self._requests.get((node, transfer.at_us), self._row)
@@ -427,7 +427,7 @@ class BusEvents:
         one.fault = fault
 
     def _judge_silent(self) -> None:
-        """Report unanswered requests; those to nodes without any frame are one finding."""
+        """Report unanswered requests. Requests to nodes without any frame are one finding."""
         absent: dict[int, int] = {}
         for node, text, row in self._silent:
             if node in self._first:
@@ -442,7 +442,7 @@ class BusEvents:
 
 
 def first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
-    """Return the first row in which each node sends anything."""
+    """Return the row of the first frame of each node."""
     first: dict[int, int] = {}
     for ident, found in rows.items():
         node = ident & NODE_MASK
@@ -453,7 +453,7 @@ def first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
 
 
 def _sends(ident: int) -> bool:
-    """Return whether a node sends with an identifier of the pre-defined connection set."""
+    """Return whether a node sends frames with an identifier of the pre-defined connection set."""
     tpdo = ident in PDO_IDS and (ident >> 7) % 2 == 1
     return tpdo or any(ident in ids for ids in (EMCY_IDS, RESPONSE_IDS, ERROR_CONTROL_IDS))
 

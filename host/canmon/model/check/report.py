@@ -1,4 +1,4 @@
-"""Findings as a JUnit report, and as SARIF 2.1.0 (OASIS), which code hosts and editors show."""
+"""Findings as a JUnit report, and as SARIF 2.1.0 (OASIS) for code hosts and editors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NONE_SKIPPED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class Judged(Protocol):
-    """What a report needs of a finding, beside its text."""
+    """The properties of a finding that a report needs besides the text."""
 
     @property
     def rule(self) -> str:
@@ -26,7 +26,7 @@ class Judged(Protocol):
 
     @property
     def text(self) -> str:
-        """What is wrong, in words."""
+        """Description of the violation."""
 
 
 def junit(
@@ -36,14 +36,14 @@ def junit(
     unjudged: str = "",
     skipped: Mapping[str, str] = _NONE_SKIPPED,
 ) -> str:
-    """Return the report.
+    """Return the findings as a JUnit report.
 
     Args:
         suite: name of the checked source.
         names: names of all rules, including those without a violation.
-        findings: the findings in their order.
-        unjudged: why rules without a finding do not count as passed; empty if they do.
-        skipped: why some rules judged nothing, by their names.
+        findings: findings in their order.
+        unjudged: reason why rules without a finding do not count as passed, empty if they do.
+        skipped: reason why a rule judged nothing, by name of the rule.
     """
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:
@@ -74,17 +74,17 @@ def sarif(
     unjudged: str = "",
     skipped: Mapping[str, str] = _NONE_SKIPPED,
 ) -> str:
-    """Return the report.
+    """Return the findings as a SARIF report.
 
     A finding has no line number, because a log is read as frames. Its time, bus and frame are
     properties. The frames around it are related locations.
 
     Args:
-        source: the checked file or bus.
+        source: file or bus that was checked.
         names: names of all rules.
-        findings: the findings in their order.
-        unjudged: why rules without a finding do not count as passed; empty if they do.
-        skipped: why some rules judged nothing, by their names.
+        findings: findings in their order.
+        unjudged: reason why rules without a finding do not count as passed, empty if they do.
+        skipped: reason why a rule judged nothing, by name of the rule.
     """
     uri = quote(source.encode("utf-8", "surrogateescape"))
     places = {name: place for place, name in enumerate(names)}

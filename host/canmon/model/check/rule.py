@@ -1,4 +1,4 @@
-"""What a rule is asked."""
+"""Rules for frames, and the interface through which rules are used."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class TrafficFinding(NamedTuple):
     """A violation of a rule, with place and time.
 
     Attributes:
-        at_us: when it was seen.
+        at_us: time at which the violation was detected.
         rule: name of the rule.
-        text: what is wrong, in words.
-        record: the frame that shows it, None if none does.
-        around: the frames around that time, decoded, if they were requested.
+        text: description of the violation.
+        record: frame that shows the violation, or None if no frame does.
+        around: decoded frames around that time, if they were requested.
     """
 
     at_us: int
@@ -46,12 +46,12 @@ class TrafficFinding(NamedTuple):
     around: tuple[tuple[Record, Decoded], ...] = ()
 
     def __str__(self) -> str:
-        """Write it as `line`, with a line as of `canmon dump` for each frame around it."""
+        """Return `line`, and a line as in `canmon dump` for each frame around the violation."""
         return self.shown(None)
 
     @property
     def line(self) -> str:
-        """One line, time and frame as candump does.
+        """Return the finding as one line, with time and frame in candump notation.
 
         >>> TrafficFinding(1_500_000, "nodes", "node 3 was never seen").line
         '(1.500000) nodes: node 3 was never seen'
@@ -60,7 +60,7 @@ class TrafficFinding(NamedTuple):
         return self._line(f"({seconds}.{micros:06d})")
 
     def shown(self, lines: DumpLines | None) -> str:
-        """Write it with its frames, and times as these lines have them; None: of the epoch."""
+        """Return the finding with its frames. `None` shows times since the epoch."""
         head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
         if not self.around:
             return head
@@ -77,18 +77,18 @@ class TrafficFinding(NamedTuple):
 
 
 NO_GAP_US: Final = -1
-"""Where a gap is compared: the first frame of an identifier has none."""
+"""Gap before the first frame of an identifier, where gaps are compared."""
 
 
 class FrameSelection(NamedTuple):
-    """Frames of an identifier that a rule must see; other frames do not change its findings.
+    """Frames of an identifier that a rule must see. Other frames do not change its findings.
 
     If no attribute is given, the rule must see all frames.
 
     Attributes:
-        below_us: frames after a shorter gap.
-        above_us: frames after a longer gap.
-        first_bytes: frames that begin with one of these.
+        below_us: length of a gap. Frames after a shorter gap are selected.
+        above_us: length of a gap. Frames after a longer gap are selected.
+        first_bytes: values of the first byte of selected frames.
         firsts: whether to include the first frame of an identifier on a bus.
     """
 
@@ -113,7 +113,7 @@ class Seen(NamedTuple):
 
     @property
     def has_gaps(self) -> bool:
-        """Whether time passed from one to another."""
+        """Whether the identifier has frames at different times."""
         return self.frames > 1 and self.first_us != self.last_us
 
 
@@ -121,9 +121,9 @@ class CheckedTraffic(NamedTuple):
     """The traffic that the rules could judge.
 
     Attributes:
-        seen: the frames of each identifier on each bus, in addition the error frames.
+        seen: frames of each identifier on each bus, and in addition the error frames.
         end_us: time when listening ended.
-        without_errors: why the source cannot contain error frames; empty if it can.
+        without_errors: reason why the source cannot contain error frames, empty if it can.
     """
 
     seen: Mapping[tuple[str, int], Seen]
@@ -132,17 +132,17 @@ class CheckedTraffic(NamedTuple):
 
     @property
     def untimed(self) -> bool:
-        """Whether all frames have one time: it says nothing of gaps."""
+        """Whether all frames have the same time, so that gaps are unknown."""
         times = {us for one in self.seen.values() for us in (one.first_us, one.last_us)}
         return len(times) == 1 and sum(one.frames for one in self.seen.values()) > 1
 
     def on(self, ident: int) -> list[Seen]:
-        """Return the frames of an identifier, bus by bus."""
+        """Return the frames of an identifier on each bus."""
         return [one for (_, other), one in self.seen.items() if other == ident]
 
     @property
     def without_canopen(self) -> str:
-        """Return why no frame can be one of CANopen; empty if some can."""
+        """Return why no frame can be a CANopen frame, empty if some frames can."""
         if any(not ident & ~(REMOTE | STANDARD_MAX) for _, ident in self.seen):
             return ""
         return "no classic frame with an 11-bit CAN-ID came"
@@ -152,7 +152,7 @@ ONE_TIME: Final = "all frames have one time"
 
 
 class Rule:
-    """One rule; this base class sees all frames that it wants, and reports nothing at the end.
+    """One rule. This base class sees all frames that it wants, and reports nothing at the end.
 
     Attributes:
         name: name of the rule in findings and reports.
@@ -161,7 +161,10 @@ class Rule:
     name = ""
 
     def wants(self, ident: int, /) -> bool:
-        """Return whether frames of an identifier matter; error frames have `ident.ERROR`."""
+        """Return whether frames of an identifier matter to the rule.
+
+        Error frames have `ident.ERROR`.
+        """
         raise NotImplementedError
 
     def selection(self, ident: int, /) -> FrameSelection:
@@ -169,20 +172,20 @@ class Rule:
         return FrameSelection()
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Return the violation that a frame shows.
+        """Return the violation in a frame.
 
         Args:
-            record: the frame.
-            gap_us: time since the previous one with this identifier on this bus; None for the
-                first.
+            record: frame to judge.
+            gap_us: time since the previous frame of this identifier on this bus, or None for the
+                first frame.
         """
         raise NotImplementedError
 
     def begin(self, at_us: int, /) -> None:
-        """Take the time of the first frame of all, before any is judged."""
+        """Record the time of the first frame of all, before any frame is judged."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Return why it has judged nothing, so that it does not count as passed.
+        """Return why the rule has judged nothing, so that it does not count as passed.
 
         A rule judges each frame that it wants. The absence of error frames also counts as judged. A
         rule with its own `end` judges what is missing.
@@ -191,7 +194,7 @@ class Rule:
             evidence: traffic with at least one frame or error frame.
 
         Returns:
-            The reason; empty if it has judged something.
+            The reason. It is empty if the rule has judged something.
         """
         by_absence = type(self).end is not Rule.end or self.wants(ERROR)
         if by_absence or any(self.wants(ident) for _, ident in evidence.seen):
@@ -199,11 +202,11 @@ class Rule:
         return "no frame that it is about came"
 
     def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
-        """Return what it could not judge besides what it has judged."""
+        """Return what the rule could not judge, in addition to its findings."""
         return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Return what is missing at the end of the traffic.
+        """Return missing frames at the end of the traffic.
 
         Args:
             latest_us: times of the last frame of each identifier, on any bus.
@@ -216,11 +219,11 @@ class Rule:
 
 
 class MaxLoad:
-    """No second of a bus has a higher load than the limit.
+    """Rule that no second of a bus has a higher load than the limit.
 
     Args:
         percent: limit of the load, in percent of the bit rate.
-        bit_rate: bits per second.
+        bit_rate: bit rate in bits per second.
 
     Attributes:
         name: name of the rule in findings.
@@ -232,7 +235,7 @@ class MaxLoad:
         self._percent, self._bit_rate = percent, bit_rate
 
     def judge(self, channel: str, window: BusSecond) -> str | None:
-        """Report a second with too high a load."""
+        """Report a second whose load is too high."""
         percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
         if percent <= self._percent:
             return None
@@ -249,7 +252,7 @@ class HeartbeatTimes(NamedTuple):
     """Limits of the time between two heartbeats of a node.
 
     Attributes:
-        node: its node-ID.
+        node: node-ID of the node.
         low_us: shortest time since the previous heartbeat.
         high_us: longest time since the previous heartbeat.
     """
@@ -260,10 +263,10 @@ class HeartbeatTimes(NamedTuple):
 
 
 class Heartbeat(Rule):
-    """A heartbeat comes in time, the first one after a boot-up whenever it likes.
+    """Rule that heartbeats arrive in time. The first one after a boot-up may arrive at any time.
 
     Attributes:
-        name: as findings have it.
+        name: name of the rule in findings.
     """
 
     def __init__(self, times: HeartbeatTimes) -> None:
@@ -273,16 +276,16 @@ class Heartbeat(Rule):
         self._free: Counter[str] = Counter()
 
     def wants(self, ident: int, /) -> bool:
-        """Take its COB-ID."""
+        """Return whether the identifier is the COB-ID of the heartbeat."""
         return ident == self._ident
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect what comes too soon or too late, and boot-ups."""
+        """Select frames that arrive too early or too late, and boot-ups."""
         _, low_us, high_us = self._times
         return FrameSelection(low_us, high_us, frozenset(_BOOT_UP), firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Compare the gap, unless the frame or the one before it is a boot-up."""
+        """Compare the gap, unless the frame or the previous frame is a boot-up."""
         booted_us = self._booted_us.get(record.channel)
         behind_boot = gap_us is not None and record.at_us - gap_us == booted_us
         if record.frame.data[:1] == _BOOT_UP:
@@ -300,14 +303,14 @@ class Heartbeat(Rule):
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Report that it stopped or never came."""
+        """Report that the heartbeat stopped or never arrived."""
         if self._ident not in latest_us:
             yield f"no heartbeat of node {self._times.node} came"
         elif end_us - latest_us[self._ident] > self._times.high_us:
             yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Report that there was no gap to compare: those around boot-ups do not count."""
+        """Report that there was no gap to compare. Gaps around boot-ups do not count."""
         if evidence.untimed:
             return ONE_TIME
         gaps = 0
@@ -326,9 +329,12 @@ class Heartbeat(Rule):
 _GUARD_TOGGLE: Final = 0x80
 _NODE_MASK: Final = 0x7F
 _LOST_AFTER: Final = 1.5
-"""A heartbeat is lost after this many of its periods, as on the node board."""
+"""Number of periods after which a heartbeat is lost, as on the node board."""
 _SURE_GAPS: Final = 2
-"""So many gaps tell a period, where a heartbeat comes after all; silence wants one."""
+"""Number of gaps from which a period is known if a heartbeat arrives late.
+
+Silence needs one gap.
+"""
 
 
 class _Watched:
@@ -336,12 +342,12 @@ class _Watched:
 
     Args:
         channel: the bus.
-        node: its node-ID.
-        period_ms: value of 1017h in its EDS; 0 if there is no such value.
+        node: node-ID of the node.
+        period_ms: value of 1017h in the EDS of the node, or 0 if there is no such value.
 
     Attributes:
-        has_sent: whether it has sent a frame of error control.
-        guarded: whether node guarding monitors it: it then sends no heartbeats.
+        has_sent: whether the node has sent a frame of error control.
+        guarded: whether node guarding monitors the node, so that the node sends no heartbeats.
         requested: whether a guarding request has no answer yet.
         judged: whether a gap was compared with a known period.
     """
@@ -363,14 +369,14 @@ class _Watched:
         self.has_sent = self.guarded = self.requested = self.judged = False
 
     def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
-        """Learn what SDO traffic says of its objects."""
+        """Take values of the node's objects from SDO traffic."""
         step = (self._sdo.request if request else self._sdo.response)(at_us, data)
         for transfer in step.ended:
             if self._memory.learn(transfer) and transfer.entry == self._heartbeat_time:
                 self._heartbeats.learn(at_us, transfer)
 
     def hear(self, at_us: int, data: bytes) -> str | None:
-        """Take a frame of error control; say that a heartbeat is lost before it."""
+        """Take a frame of error control. Return a finding if a heartbeat before it is lost."""
         self.has_sent = True
         if data[:1] == _BOOT_UP:
             self._memory.boot()
@@ -385,7 +391,10 @@ class _Watched:
         return said
 
     def _lost_before(self, at_us: int) -> str | None:
-        """Report the heartbeats lost before this one: traffic takes precedence over an EDS."""
+        """Report the heartbeats that are lost before this one.
+
+        Traffic takes precedence over an EDS.
+        """
         beats = self._heartbeats
         said = self.overdue(at_us)
         if beats.by_sdo or len(beats.gaps) >= _SURE_GAPS:
@@ -400,7 +409,7 @@ class _Watched:
         return doubted if keeps_eds else None
 
     def overdue(self, at_us: int) -> str | None:
-        """Report that its heartbeat is lost at a time."""
+        """Report that the heartbeat of the node is lost at a time."""
         beats = self._heartbeats
         period_us = None if self.guarded else beats.period_us
         if period_us is None or beats.since_us is None:
@@ -416,12 +425,12 @@ class _Watched:
 
     @property
     def watched(self) -> bool:
-        """Whether it sent a heartbeat, or SDO traffic contains its period."""
+        """Whether the node sent a heartbeat, or SDO traffic contains the heartbeat period."""
         return self.has_sent or self._heartbeats.by_sdo
 
     @property
     def doubt(self) -> str:
-        """Why nothing was judged of it."""
+        """Reason why no heartbeat of the node was judged."""
         if self.guarded:
             return f"{self._name} is guarded"
         if self._heartbeats.period_us is None:
@@ -430,7 +439,7 @@ class _Watched:
 
 
 class NoLostHeartbeat(Rule):
-    """No heartbeat of a node that sends one is lost.
+    """Rule that no heartbeat of a node that sends heartbeats is lost.
 
     The period is the value of 1017h in SDO traffic, or else the measured period, or else the value
     in an EDS. The node board uses the same order. A boot-up restarts the supervision. Answers to
@@ -448,12 +457,12 @@ class NoLostHeartbeat(Rule):
         self._begin_us: int | None = None
 
     def wants(self, ident: int, /) -> bool:
-        """Take the COB-IDs of error control, and those of SDO, which may tell 1017h."""
+        """Return whether the identifier is for error control, or for SDO that may read 1017h."""
         is_sdo = ident in _ANSWER_IDS or ident in _REQUEST_IDS
         return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS
 
     def begin(self, at_us: int, /) -> None:
-        """Note when listening began."""
+        """Record the begin of listening."""
         self._begin_us = at_us
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
@@ -470,7 +479,7 @@ class NoLostHeartbeat(Rule):
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Name the nodes whose heartbeat stopped, and those with an EDS that sent none."""
+        """Report nodes whose heartbeat stopped, and nodes with an EDS that sent no heartbeat."""
         for _, node in sorted(self._nodes.items()):
             if (text := node.overdue(end_us)) is not None:
                 yield text
@@ -484,7 +493,7 @@ class NoLostHeartbeat(Rule):
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Report that no period was known, or none has passed."""
+        """Report that no period was known, or that no period has passed."""
         if evidence.untimed:
             return ONE_TIME
         doubts = self._doubts()
@@ -493,7 +502,7 @@ class NoLostHeartbeat(Rule):
         return "; ".join(doubts) or "no heartbeat came"
 
     def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
-        """Name the nodes of which nothing was judged."""
+        """Report the nodes that were not judged."""
         return self._doubts()
 
     def _watched(self, channel: str, node: int) -> _Watched:
@@ -512,10 +521,10 @@ class NoLostHeartbeat(Rule):
 
 
 class MaxGap(Rule):
-    """An identifier comes again in time.
+    """Rule that frames of an identifier repeat in time.
 
     Attributes:
-        name: as findings have it.
+        name: name of the rule in findings.
     """
 
     def __init__(self, ident: int, most_us: int) -> None:
@@ -523,26 +532,26 @@ class MaxGap(Rule):
         self.name = f"max-gap {ident_text(ident)}"
 
     def wants(self, ident: int, /) -> bool:
-        """Take its frames."""
+        """Return whether the identifier is that of the rule."""
         return ident == self._ident
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect what comes too late."""
+        """Select frames that arrive too late."""
         return FrameSelection(above_us=self._most_us)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Compare the gap."""
+        """Compare the gap before the frame."""
         return None if gap_us is None or gap_us <= self._most_us else self._said(gap_us)
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Report that it stopped or never came."""
+        """Report that the frames stopped or never arrived."""
         if self._ident not in latest_us:
             yield f"{ident_text(self._ident)} never came"
         elif end_us - latest_us[self._ident] > self._most_us:
             yield self._said(end_us - latest_us[self._ident])
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Report that it came once."""
+        """Report that the identifier had only one frame."""
         if evidence.untimed:
             return ONE_TIME
         if any(seen.has_gaps for seen in evidence.on(self._ident)):
@@ -565,15 +574,18 @@ _NAMED_BYTES: Final = 4
 
 
 class CanopenRule(Rule):
-    """A rule about frames that should not be there, among those that may be of CANopen."""
+    """Rule against frames that should not occur, among frames that may be CANopen frames."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Return why no frame can be one of CANopen."""
+        """Return why no frame can be a CANopen frame."""
         return evidence.without_canopen
 
 
 class NoEmcy(CanopenRule):
-    """No EMCY except error reset, on the default COB-IDs; one that is too short counts too."""
+    """Rule against EMCY messages except error reset, on the default COB-IDs.
+
+    Short EMCYs count too.
+    """
 
     name = "no-emcy"
 
@@ -581,11 +593,11 @@ class NoEmcy(CanopenRule):
         self._cut = 0
 
     def wants(self, ident: int, /) -> bool:
-        """Take the COB-IDs of EMCY."""
+        """Return whether the identifier is a COB-ID of EMCY."""
         return ident in _EMCY_IDS
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Name the error."""
+        """Report the error code."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
         data, node = frame.data, frame.can_id & _NODE_MASK
@@ -604,20 +616,23 @@ class NoEmcy(CanopenRule):
 
 
 class NoSdoAbort(CanopenRule):
-    """No aborted transfer at a default SDO server; an abort that is cut short is one, too."""
+    """Rule against aborted transfers at default SDO servers.
+
+    An abort that is too short counts too.
+    """
 
     name = "no-sdo-abort"
 
     def wants(self, ident: int, /) -> bool:
-        """Take the COB-IDs of the default servers."""
+        """Return whether the identifier is a COB-ID of a default SDO server."""
         return ident in _ANSWER_IDS or ident in _REQUEST_IDS
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect aborts."""
+        """Select SDO aborts."""
         return FrameSelection(first_bytes=frozenset([sdo_frame.ClientCommand.ABORT]))
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Name object and abort code."""
+        """Report object and abort code."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
         data = frame.data
@@ -636,16 +651,16 @@ class NoSdoAbort(CanopenRule):
 
 
 class NoErrorFrames(Rule):
-    """No error frame."""
+    """Rule against error frames."""
 
     name = "no-error-frames"
 
     def wants(self, ident: int, /) -> bool:
-        """Take error frames."""
+        """Return whether the identifier is that of error frames."""
         return ident == ERROR
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Report what failed."""
+        """Report the class of the error."""
         frame = record.frame
         assert isinstance(frame, ErrorFrame)
         return describe_error_frame(frame)
@@ -656,10 +671,10 @@ class NoErrorFrames(Rule):
 
 
 class KnownIds(Rule):
-    """No identifiers except these; each other one is reported once per bus.
+    """Rule against other identifiers than these. Each other identifier is reported once per bus.
 
     Args:
-        idents: see `ident_of`.
+        idents: allowed identifiers as `ident_of` returns them.
     """
 
     name = "known"
@@ -668,15 +683,15 @@ class KnownIds(Rule):
         self._idents = idents
 
     def wants(self, ident: int, /) -> bool:
-        """Take all others."""
+        """Return whether the identifier is not allowed."""
         return ident not in self._idents and ident != ERROR
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect the first frame."""
+        """Select the first frame of an identifier."""
         return FrameSelection(firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Tell the first frame."""
+        """Report the first frame of an identifier."""
         return None if gap_us is not None else f"{_text(record)} is not expected"
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
@@ -693,7 +708,10 @@ _RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMM
 
 
 class NodesPresent(Rule):
-    """These nodes are present: each has sent a frame with one of its default COB-IDs."""
+    """Rule that nodes are present.
+
+    A present node has sent a frame with one of its default COB-IDs.
+    """
 
     name = "nodes"
 
@@ -701,15 +719,15 @@ class NodesPresent(Rule):
         self._nodes = sorted(nodes)
 
     def wants(self, ident: int, /) -> bool:
-        """Take nothing: what is missing is seen at the end."""
+        """Return False. Missing nodes are found at the end."""
         return False
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Find nothing."""
+        """Return no finding."""
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Name those that were never seen."""
+        """Report the nodes that sent no frame."""
         present = set(map(sender_of, latest_us))
         for node in self._nodes:
             if node not in present:
@@ -717,7 +735,7 @@ class NodesPresent(Rule):
 
 
 class NoReboot(CanopenRule):
-    """No node that was seen before boots without an NMT reset.
+    """Rule that no node that was already active boots without an NMT reset.
 
     Any frame that begins with 0 counts as a boot-up, because some nodes send more than one byte.
     """
@@ -729,18 +747,18 @@ class NoReboot(CanopenRule):
         self._present: set[tuple[str, int]] = set()
 
     def wants(self, ident: int, /) -> bool:
-        """Take NMT commands and what nodes send."""
+        """Return whether the identifier is that of NMT commands, or belongs to a node."""
         return ident == nmt.NMT_COB_ID or sender_of(ident) is not None
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Process resets and boot-ups; the first other frame marks its node as seen."""
+        """Select resets and boot-ups. The first other frame marks a node as active."""
         if ident == nmt.NMT_COB_ID:
             return FrameSelection(first_bytes=_RESETS)
         boot_up = frozenset(_BOOT_UP) if ident in _ERROR_CONTROL_IDS else frozenset()
         return FrameSelection(first_bytes=boot_up, firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Note a reset; say that a boot-up comes without one."""
+        """Record a reset. Report a boot-up without a reset."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
         node = sender_of(frame.can_id)

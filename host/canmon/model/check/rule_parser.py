@@ -1,4 +1,4 @@
-"""Rules as text: an event in the words of `-F`, a demand on it, and the scope of the demand.
+"""Rules as text, which consist of an event as for `-F`, a demand on the event, and a scope.
 
 ```
 rule   = event demand (scope) ...
@@ -41,27 +41,27 @@ from tickrig.wire.can import ErrorFrame
 
 
 class RuleScope:
-    """Says whether a rule is in force.
+    """The scope of a rule, which determines whether the rule applies.
 
     Attributes:
-        text: as it is written.
+        text: text of the scope.
     """
 
     text = ""
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Process each frame; return whether it is judged."""
+        """Process each frame. Return whether the frame is judged."""
         raise NotImplementedError
 
 
 class _After(RuleScope):
-    """From the first frame after an event on."""
+    """Scope that begins with the first frame after an event."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
         self._event, self._came, self.text = event, False, f"after {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Hold once it came; the event itself is not judged."""
+        """Return True once the event has occurred. The event itself is not judged."""
         came = self._came
         if not came:
             self._came = self._event.matches(record, decoded)
@@ -69,27 +69,27 @@ class _After(RuleScope):
 
 
 class _Before(RuleScope):
-    """Until an event."""
+    """Scope that ends with an event."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
         self._event, self._came, self.text = event, False, f"before {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Hold until it comes; the event itself is not judged."""
+        """Return True until the event occurs. The event itself is not judged."""
         if not self._came:
             self._came = self._event.matches(record, decoded)
         return not self._came
 
 
 class _While(RuleScope):
-    """While a condition on signals holds, by the latest frame of the bus that carries one."""
+    """Scope in which a condition on signals is true, by the latest frame with such a signal."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
         self._event, self._carries, self.text = event, event.carriers(), f"while {event.text}"
         self._true: dict[str, bool] = {}
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Hold from the frame on that makes it true."""
+        """Return True from the frame that makes the condition true."""
         if self._carries(decoded):
             self._true[record.channel] = self._event.matches(record, decoded)
         return self._true.get(record.channel, False)
@@ -103,14 +103,14 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 _TYPE: Final = re.compile(r"[usfb*/+-]\S*")
 
 _Slice = tuple[str, FrameSlice]
-"""Bits of a frame, under the name by which a rule asks for them."""
+"""Bits of a frame, under the name that a rule uses."""
 
 
 class SliceParser(FilterParser):
-    """Takes slices where a filter takes signals.
+    """Parser that accepts slices of frames in places where a filter has signals.
 
     Args:
-        text: the rule.
+        text: text of the rule.
     """
 
     def __init__(self, text: str) -> None:
@@ -136,7 +136,7 @@ class SliceParser(FilterParser):
         return is_id and self._tokens[1] == ("[", column + len(word))
 
     def _slice(self) -> str:
-        """Take the words of a slice; return it as it is written."""
+        """Read the words of a slice. Return them as written."""
         begin = self._next.column - 1
         while self._next.text not in ("]", ""):
             del self._tokens[0]
@@ -153,7 +153,7 @@ class SliceParser(FilterParser):
 
 
 def _with_slices(record: Record, decoded: Decoded, slices: Iterable[_Slice]) -> Decoded:
-    """Return what a frame says, with the slices that are of it."""
+    """Return a decoded frame with the added values of its slices."""
     frame = record.frame
     if isinstance(frame, ErrorFrame) or frame.remote:
         return decoded
@@ -173,7 +173,7 @@ def _plain(value: float) -> float:
 # A rule written as an expression, checked against decoded frames one by one.
 
 _MOST_NAMES: Final = 1_000
-"""Number of signal names kept, for the suggestion after a misspelt one."""
+"""Number of signal names kept, used for the suggestion after a misspelt name."""
 
 
 _UNMAPPED: Final = "unmapped"
@@ -181,17 +181,17 @@ _NO_MAPPING: Final = "; PDOs without a known mapping came: describe them by --ed
 
 
 class ExpressionRule:
-    """One rule; a rule for several nodes is split into one rule for each node.
+    """One rule as an expression. A rule for several nodes is split into one rule for each node.
 
-    A signal that the rule names must occur in the traffic. Its name may be misspelt, and a rule
+    A signal that the rule names must occur in the traffic, because its name may be misspelt. A rule
     that judges nothing does not count as passed.
 
     Args:
         name: name of the rule in findings and reports.
-        demand: the demand.
-        scopes: when the demand applies; empty for always.
-        missing: the signals and words that the rule names and that have not occurred yet.
-        slices: those of these signals that are bits of frames.
+        demand: demand of the rule.
+        scopes: scopes in which the demand applies, empty for always.
+        missing: signals and words that the rule names and that have not occurred yet.
+        slices: missing signals that are bits of frames.
         mapped: whether the rule is about the contents of PDOs, or names PDOs by number.
     """
 
@@ -214,11 +214,11 @@ class ExpressionRule:
 
     @property
     def due_us(self) -> int:
-        """Until when `advance` has nothing to say."""
+        """Time until which `advance` has nothing to report."""
         return self._demand.due_us
 
     def take(self, record: Record, decoded: Decoded) -> TrafficFinding | None:
-        """Return how a frame breaks it."""
+        """Return the violation in a frame."""
         if self._slices:
             decoded = _with_slices(record, decoded, self._slices)
         if self._looks:
@@ -233,7 +233,7 @@ class ExpressionRule:
         return TrafficFinding(record.at_us, self.name, text, record)
 
     def advance(self, now_us: int) -> list[TrafficFinding]:
-        """Return what had not come in time before a frame of this time; listening goes on."""
+        """Return frames that are overdue before a frame of this time. Listening continues."""
         if now_us <= self.due_us:
             return []
         self._found = True
@@ -243,7 +243,7 @@ class ExpressionRule:
         ]
 
     def end(self, end_us: int) -> list[TrafficFinding]:
-        """Return what is missing at a time; nothing is changed by it."""
+        """Return missing frames at a time. The state of the rule does not change."""
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
@@ -252,7 +252,7 @@ class ExpressionRule:
         return [TrafficFinding(end_us, self.name, text + hint) for text in texts]
 
     def unjudged(self, evidence: CheckedTraffic) -> str:
-        """Return why it has judged nothing; empty if it has."""
+        """Return why the rule has judged nothing, empty if it has judged something."""
         if not self._forced:
             return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"
         if self._demand.timed and evidence.untimed:
@@ -276,7 +276,7 @@ class ExpressionRule:
         return running
 
     def _look(self, record: Record, decoded: Decoded) -> None:
-        """Watch which signals come, until all have, and whether PDOs without a mapping come."""
+        """Record which signals occur, until all have occurred. Record PDOs without a mapping."""
         if self._mapped and decoded.kind == _UNMAPPED:
             self._unmapped = True
         self._missing.take(record, decoded)
@@ -297,7 +297,7 @@ _SHARE: Final = re.compile(r"([0-9]{1,6}(?:\.[0-9]{1,6})?)%")
 
 
 def _time_us(text: str) -> int | None:
-    """Read a time with its unit; None if it is none.
+    """Read a time with its unit, or return None if the text is not a time.
 
     >>> _time_us("1.5ms"), _time_us("2")
     (1500, None)
@@ -319,7 +319,7 @@ def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
     """Return a function that returns whether a signal has one of the given values.
 
     Args:
-        parts: each is a value, or the two ends of a range; one of the ends may be empty.
+        parts: values. Each is a value, or the two ends of a range, of which one may be empty.
 
     Raises:
         ValueError: an end is not a number, or the lower one is above the other.
@@ -355,23 +355,23 @@ def _within(low: str, high: str) -> Callable[[Signal], bool]:
 
 
 class RuleError(FilterError):
-    """Text that is no rule."""
+    """A text that is not a rule."""
 
     what = "rule"
 
 
 SCOPES: Final = ("after", "before", "while")
 _UNITS: Final = ("s", "ms", "us", "%")
-"""Of what has no blank before its unit."""
+"""Units of quantities that have no blank before the unit."""
 
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
 class _QuantityParser(SliceParser):
-    """Takes quantities from the words of a rule.
+    """Parser of quantities in the words of a rule.
 
     Args:
-        text: the rule.
+        text: text of the rule.
     """
 
     wrong = RuleError
@@ -390,7 +390,7 @@ class _QuantityParser(SliceParser):
         return found
 
     def _under(self) -> int:
-        """Take a limit of time."""
+        """Read a limit of time."""
         if not self._take("under", "within"):
             raise self._error(f"{self._came()} where 'under' or 'within' and a time are wanted")
         return self._time()
@@ -410,7 +410,7 @@ class _QuantityParser(SliceParser):
         return f"; without a blank, as {value}{unit[0].text}"
 
     def _span(self) -> tuple[int, int | None]:
-        """Take how far frames may be apart: `10ms ±10%`, `9ms..11ms`, `5ms..`, `..20ms`."""
+        """Read the allowed time between frames: `10ms ±10%`, `9ms..11ms`, `5ms..`, `..20ms`."""
         if self._take(".."):
             return 0, self._time()
         low_us = self._time()
@@ -433,7 +433,7 @@ class _QuantityParser(SliceParser):
         return low_us, high_us
 
     def _values(self) -> demands.Values:
-        """Take what is right: `{1, 8130h, 5..9, stopped}`, or `1..5` alone."""
+        """Read the allowed values, such as `{1, 8130h, 5..9, stopped}`, or `1..5` alone."""
         begin = self._next.column - 1
         parts = [self._value()] if not self._take("{") else self._members()
         text = self._text[begin : self._next.column - 1].strip()
@@ -450,7 +450,7 @@ class _QuantityParser(SliceParser):
         return parts
 
     def _value(self) -> tuple[str, ...]:
-        """Take a value, or both ends of a range; an end that is open is empty."""
+        """Read a value, or both ends of a range. An open end is empty."""
         low = "" if self._next.text == ".." else self._word()
         if not self._take(".."):
             return (low,)
@@ -463,7 +463,7 @@ class _QuantityParser(SliceParser):
         return self._tokens.pop(0).text
 
     def _take_one(self, *words: str) -> str:
-        """Take the next token if it is one of these; return it, or nothing."""
+        """Read the next token if it is one of these. Return the token, or an empty text."""
         word, column = self._next
         if not self._take(*words):
             return ""
@@ -471,7 +471,7 @@ class _QuantityParser(SliceParser):
         return word
 
     def _refuse_word(self, reason: str) -> RuleError:
-        """Return the error of the word that `_take_one` took."""
+        """Return the error about the word that `_take_one` read."""
         return RuleError(self._text, self._word_column, reason)
 
     def _came(self) -> str:
@@ -487,10 +487,10 @@ _OTHERS: Final = frozenset(["not", "!", "!="])
 def errors_alone(
     test: filters.Test, tokens: Iterable[Token], signals: Collection[str]
 ) -> filters.Test:
-    """Return the test of frames as events: an EMCY with code 0000h is not an event.
+    """Return a test of frames as events. An EMCY with code 0000h is not an event for this test.
 
-    It is an event if the filter does not name `emcy`, has a `not`, or names a signal, such as `emcy
-    and code = 0`.
+    Such an EMCY is an event if the filter does not name `emcy`, has a `not`, or names a signal,
+    such as `emcy and code = 0`.
 
     Args:
         test: test of the filter.
@@ -527,7 +527,7 @@ BEHIND: Final = {
     "while": "the demand, as emcy never while node 3 stopped",
     **dict.fromkeys(filters.NMT_STATES, "a node, as node 3 stopped"),
 }
-"""Words that are no demand, and what they stand behind."""
+"""Words that are not a demand, and the words that they follow."""
 
 _EACH_NODE: Final = (
     demands.Every,
@@ -536,7 +536,10 @@ _EACH_NODE: Final = (
     demands.Count,
     demands.Rate,
 )
-"""Demands that are made of each node where several are named; the others tell them apart."""
+"""Demands that apply to each node if several nodes are named.
+
+Other demands distinguish the nodes.
+"""
 
 _NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
 _OF: Final = re.compile(r"(?<!\s)\s++of\s")
@@ -544,16 +547,19 @@ _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
 
 class _RuleParser(_QuantityParser):
-    """Recursive descent over the grammar above.
+    """Recursive descent parser for the grammar above.
 
     Args:
-        text: the rule.
+        text: text of the rule.
     """
 
     def rule(
         self,
     ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[_Slice]]:
-        """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
+        """Return demand, scopes, signals and slices of a rule.
+
+        Raise RuleError for any other text.
+        """
         self._named: set[str] = set()
         demand = self._demand(self._subject())
         scopes = []
@@ -575,14 +581,14 @@ class _RuleParser(_QuantityParser):
         return demands.RuleEvent(demands.EVERY.text, lambda record, decoded: decoded.node in nodes)
 
     def _nodes_behind(self) -> range:
-        """Take node-IDs that stand behind the next token."""
+        """Read node-IDs that follow the next token."""
         word = self._tokens.pop(0)
         nodes = self._node_ids()
         self._tokens.insert(0, word)
         return nodes
 
     def _event(self) -> demands.RuleEvent:
-        """Take a filter, as far as it goes."""
+        """Read a filter up to its end."""
         tokens, signals, nodes = list(self._tokens), self._signals, self._nodes
         self._signals, self._nodes = set(), set()
         test = self._or()
@@ -689,14 +695,14 @@ class Expression:
 
     Attributes:
         name: name of the rule in findings and reports.
-        texts: the rule, once for each node that it applies to.
+        texts: text of the rule for each node that it applies to.
     """
 
     name: str
     texts: tuple[str, ...]
 
     def make(self) -> list[ExpressionRule]:
-        """Return new rules that have seen nothing yet."""
+        """Return new rules without any state."""
         return [_made(self.name, text) for text in self.texts]
 
 
@@ -712,11 +718,11 @@ def parse_rule(text: str, name: str = "") -> Expression:
     """Parse a rule.
 
     Args:
-        text: the rule.
-        name: its name in findings; empty to use its text.
+        text: text of the rule.
+        name: name of the rule in findings, or empty to use the text of the rule.
 
     Raises:
-        RuleError: the text is not a rule; the message names the column.
+        RuleError: the text is not a rule. The message names the column.
     """
     demand, *_ = _RuleParser(text).rule()
     name = name or " ".join(text.split())

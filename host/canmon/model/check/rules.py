@@ -1,4 +1,4 @@
-"""All rules of a check: as values, and as text of a command line or of TOML."""
+"""All rules of a check, as values, and as text on a command line or in TOML."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 NO_LOSS: Final = "no-loss"
-"""The rule that no frame was lost and every line of a log is one."""
+"""Name of the rule that no frame is lost, and that every line of a log is a frame."""
 
 
 EdsHeartbeats = Mapping[int, int]
@@ -33,21 +33,22 @@ class Rules:
     """The rules for the traffic.
 
     Attributes:
-        max_load: percent of the bit rate in any second, None for no limit.
-        bit_rate: bits per second, if it is not known otherwise; not a rule by itself.
-        no_emcy: no EMCY except error reset.
-        no_sdo_abort: no aborted SDO transfer.
-        no_error_frames: no error frame.
-        no_reboot: no second boot-up of a node without an NMT reset.
-        no_lost_heartbeat: no node stops sending heartbeats.
-        no_loss: no frame lost, no invalid line in a log.
-        heartbeats: periods of the heartbeats of some nodes.
+        max_load: largest load of any second in percent of the bit rate, or None for no limit.
+        bit_rate: bit rate in bits per second, if it is not known otherwise. It is not a rule by
+            itself.
+        no_emcy: whether EMCY messages except error reset are forbidden.
+        no_sdo_abort: whether aborted SDO transfers are forbidden.
+        no_error_frames: whether error frames are forbidden.
+        no_reboot: whether a second boot-up of a node without an NMT reset is forbidden.
+        no_lost_heartbeat: whether a node must not stop sending heartbeats.
+        no_loss: whether lost frames and invalid lines in a log are forbidden.
+        heartbeats: limits of the heartbeat times of some nodes.
         nodes: nodes that must be present.
         max_gaps: identifiers and the longest allowed gap of each, in microseconds.
-        known: all allowed identifiers; None for any.
-        others: factories of further rules, from installed packages.
-        expressions: rules about decoded frames. `Checker` checks them if it gets decoded frames;
-            the block-wise check does not.
+        known: all allowed identifiers, or None for any.
+        others: factories of further rules from installed packages.
+        expressions: rules about decoded frames. `Checker` checks them if it gets decoded frames.
+            The block-wise check does not support them.
     """
 
     max_load: float | None = None
@@ -66,16 +67,16 @@ class Rules:
     expressions: tuple[Expression, ...] = ()
 
     def names(self) -> list[str]:
-        """Return the names of all rules, for a report."""
+        """Return the names of all rules, used in a report."""
         names = ["max-load"] * (self.max_load is not None) + [NO_LOSS] * self.no_loss
         names += [rule.name for rule in self.make()]
         return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
     def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
-        """Return new rules about frames.
+        """Return new rules for frames.
 
         Args:
-            eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+            eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
         """
         made: list[Rule] = []
         made += [rule.NoEmcy()] * self.no_emcy
@@ -91,7 +92,10 @@ class Rules:
         return made
 
     def load(self, bit_rate: int | None) -> rule.MaxLoad | None:
-        """Return the rule about load; ValueError if it needs a bit rate and there is none."""
+        """Return the rule about the load.
+
+        Raise ValueError if the bit rate that it needs is missing.
+        """
         if self.max_load is None:
             return None
         bit_rate = self.bit_rate if bit_rate is None else bit_rate
@@ -101,7 +105,10 @@ class Rules:
 
 
 RuleValues = Mapping[str, object]
-"""Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
+"""Rules by their names with underscores.
+
+A value is True, a number, text, list of texts, or table.
+"""
 
 _LoadRule = Callable[[str], Callable[[], Rule]]
 
@@ -121,7 +128,7 @@ _HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-
 _NAMES: Final = re.compile(r"[\w.-]*(?:\s*,\s*[\w.-]+)*", re.ASCII)
 _NAMED: Final = re.compile(r"(.*\S): (.*)", re.DOTALL)
 _ONE_WORD: Final = ("dlc",)
-"""Rules that are written out as one word, and no names."""
+"""Expressions that consist of one word, and are not names of rules."""
 _NODES: Final = re.compile(r"([0-9]{1,9})(?:-([0-9]{1,9}))?")
 _MAX_NODE: Final = 127
 _MAX_IDENTS: Final = 1 << 16
@@ -135,11 +142,12 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
     """Read rules.
 
     Args:
-        words: the rules.
-        load_rule: returns the factory of a rule of another package, by its name under `rule`.
+        words: texts of the rules.
+        load_rule: function that returns the factory of a rule of another package, by its name under
+            `rule`.
 
     Raises:
-        ValueError: a rule is unknown, or has an invalid value.
+        ValueError: a rule is unknown or has an invalid value.
 
     >>> parse_rules({"no_emcy": True, "heartbeat": ["3=100ms±20%"]}).heartbeats
     (HeartbeatTimes(node=3, low_us=80000, high_us=120000),)
@@ -171,7 +179,7 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
 
 
 def joined(first: RuleValues, second: RuleValues) -> RuleValues:
-    """Return the rules of both; a number in the second replaces the number in the first.
+    """Return the rules of both sets. A number in the second set replaces the number in the first.
 
     >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
     {'known': ['181', '182'], 'max_load': 60}
@@ -184,7 +192,7 @@ def joined(first: RuleValues, second: RuleValues) -> RuleValues:
 
 
 def _named_and_written(texts: Iterable[str]) -> tuple[list[str], tuple[Expression, ...]]:
-    """Tell names of rules of other packages from rules that are written out."""
+    """Separate names of rules of other packages from rules that are written as expressions."""
     names: list[str] = []
     expressions: list[Expression] = []
     for text in texts:
@@ -221,7 +229,10 @@ def _bit_rate(value: object) -> int | None:
 
 
 def _texts(name: str, words: RuleValues) -> list[str]:
-    """Return what a rule is given as texts; a table is texts with `=`, of `rule` with `: `."""
+    """Return the values of a rule as texts.
+
+    A table becomes texts with `=`, or with `: ` for `rule`.
+    """
     value = words.get(name, ())
     if isinstance(value, Mapping):
         sign = ": " if name == "rule" else "="
@@ -264,7 +275,10 @@ def _nodes(text: str) -> range:
 
 
 def _idents(text: str) -> Iterator[int]:
-    """Give identifiers; those that say nothing of remote frames stand for these, too."""
+    """Yield identifiers.
+
+    Identifiers without a word on remote frames stand for remote frames too.
+    """
     words = text.split("-")
     if len(words) > 2 or not all(words):
         raise ValueError(f"known {text!r} is not like 181 or 181-18F")
@@ -286,11 +300,11 @@ def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
     """Return the rules of a file by their names.
 
     Args:
-        text: the whole file.
-        load_rule: see `parse_rules`.
+        text: text of the whole file.
+        load_rule: function as for `parse_rules`.
 
     Raises:
-        ValueError: the file has mistakes; the message names each with its line.
+        ValueError: the file has mistakes. The message names each mistake with its line.
     """
     try:
         words = load_toml(text)
@@ -305,7 +319,7 @@ def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
 
 
 def _mistakes(text: str, load_rule: _LoadRule) -> list[str]:
-    """Try each rule alone; report only the syntax error of invalid TOML."""
+    """Try each rule alone. Report only the syntax error of invalid TOML."""
     document = read_toml(text)
     found = [(line, reason) for line, reason in document.mistakes]
     for path, words in () if found else _alone(document.values):
@@ -317,7 +331,7 @@ def _mistakes(text: str, load_rule: _LoadRule) -> list[str]:
 
 
 def _alone(words: RuleValues) -> Iterator[tuple[tuple[str | int, ...], RuleValues]]:
-    """Give each rule with its path."""
+    """Yield each rule with its path."""
     for name, value in words.items():
         if name in _LISTS and isinstance(value, Mapping):
             yield from (((name, key), {name: {key: entry}}) for key, entry in value.items())

@@ -1,4 +1,6 @@
-"""Write whole columns of numbers as text, each as `str` writes it; needs numpy.
+"""Columns of numbers as text, each number as `str` writes it.
+
+The module needs numpy.
 
 >>> parts, right = scaled(np.array([1, 3, -25]), Scale.of(0.1, 0))
 >>> joined(3, [*parts, b" "]), right.tolist()
@@ -27,41 +29,41 @@ import numpy.typing as npt
 # 0.30000000000000004) are left to `str`. A number takes some 0.05 us, where `str` takes 0.5 us.
 
 Cells = npt.NDArray[np.uint8]
-"""A part of each line: a row of characters, zeros where it has fewer."""
+"""A part of each line, as a row of characters with zeros after a short text."""
 
 Part = bytes | Cells
-"""The same text in each line, or one for each."""
+"""A part of lines: one text for all lines, or one text for each line."""
 
 Mask = npt.NDArray[np.bool_]
 
 _RADIX: Final = 10_000
 _EXACT: Final = 10**15
-"""Below, two decimal numbers are two floats."""
+"""Amount below which two different decimal numbers are different floats."""
 _PLACES: Final = 8
-"""Decimals of which exact numbers are written."""
+"""Number of decimals up to which exact numbers are written."""
 _SMALLEST: Final = 1e-4
-"""Below, `str` writes an exponent."""
+"""Amount below which `str` writes an exponent."""
 WHOLE: Final = 1 << 62
-"""Whole numbers below are written at once."""
+"""Amount below which whole numbers are written at once."""
 _WIDEST: Final = 256
-"""A text with more characters would make a row of all others long."""
+"""Length of a text above which the text is kept apart, because all rows would become long."""
 _MARK: Final = "\x01"
-"""Stands where a wide text belongs; no text of a line has it."""
+"""Mark for the place of a wide text. No text of a line contains this character."""
 
 
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return texts as numbers of one width, that a table of them may be looked up at once."""
+    """Return texts as numbers of one width, so that many texts can be looked up at once."""
     size = np.dtype(dtype).itemsize
     return np.array([text.encode() for text in texts], f"S{size}").view(dtype)
 
 
 def of(numbers: npt.NDArray[Any]) -> Cells:
-    """Return the characters in numbers of a table, a row for each frame."""
+    """Return the characters of numbers from a table, with a row for each frame."""
     return np.ascontiguousarray(numbers).view(np.uint8).reshape(len(numbers), -1)
 
 
 def encoded(text: str) -> bytes:
-    """Return a text as bytes of a row."""
+    """Return a text as the bytes of a row."""
     return text.encode("utf-8", "surrogatepass")
 
 
@@ -71,7 +73,7 @@ def of_texts(texts: Iterable[str]) -> Cells:
 
 
 def together(count: int, parts: Sequence[Part]) -> Cells:
-    """Put the parts of all lines together."""
+    """Combine the parts of all lines."""
     widths = [len(part) if isinstance(part, bytes) else part.shape[1] for part in parts]
     rows, begin = np.empty((count, sum(widths)), np.uint8), 0
     for part, width in zip(parts, widths, strict=True):
@@ -88,23 +90,23 @@ def joined(count: int, parts: Sequence[Part]) -> str:
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
-    """Write one text in some rows, and another one in all others."""
+    """Write one text in some rows, and another text in all other rows."""
     width = max(len(text), len(other))
     both = np.array([other, text], f"S{width}")
     return of(both[:, np.newaxis])[rows.astype(np.int8)]
 
 
 def of_few(values: npt.NDArray[Any], write: Callable[[int], str]) -> Cells:
-    """Write numbers of which few are different."""
+    """Write numbers that have few different values."""
     found, places = np.unique(values, return_inverse=True)
     return of_texts(map(write, found.tolist()))[places]
 
 
 class Texts:
-    """Texts of the rows of a block, empty at first.
+    """The texts for the rows of a block, which are empty at first.
 
     Args:
-        count: of the rows.
+        count: number of rows.
     """
 
     def __init__(self, count: int) -> None:
@@ -114,7 +116,7 @@ class Texts:
         self._wide: dict[int, str] = {}
 
     def put(self, rows: npt.NDArray[np.int64], texts: Cells) -> None:
-        """Set the texts of some rows, none of them empty; one text counts for all rows."""
+        """Set the texts of some rows. No text may be empty. One text counts for all rows."""
         if texts.shape[1] <= _WIDEST:
             self._pieces.append((rows, texts))
             return
@@ -127,7 +129,7 @@ class Texts:
 
     @cached_property
     def cells(self) -> Cells:
-        """The rows, with a mark where a text is wide; zeros where nothing was set."""
+        """The rows, with a mark in place of a wide text, and zeros in rows without a text."""
         pieces = list(self._pieces)
         for found in (self._single, dict.fromkeys(self._wide, _MARK)):
             if found:
@@ -139,7 +141,7 @@ class Texts:
         return rows
 
     def lines(self, rows: slice, parts: Sequence[Part] = ()) -> str:
-        """Return lines of some rows: parts that stand before their texts, and these."""
+        """Return the lines of some rows, with parts before their texts."""
         texts = self.cells[rows]
         found = joined(len(texts), [*parts, texts, b"\n"])
         if not self._wide or _MARK not in found:
@@ -150,11 +152,11 @@ class Texts:
 
 
 class TextTable:
-    """Texts of numbers with few bits; each text is written when its number first occurs.
+    """A table of texts for numbers with few bits. A text is written when its number first occurs.
 
     Args:
         bits: number of bits of each number.
-        write: writes one number.
+        write: function that writes one number.
     """
 
     def __init__(self, bits: int, write: Callable[[int], str]) -> None:
@@ -175,7 +177,7 @@ class TextTable:
 
 
 def widened(rows: Cells, width: int) -> Cells:
-    """Return rows of at least this many characters."""
+    """Return rows that have at least this many characters."""
     if rows.shape[1] >= width:
         return rows
     wide = np.zeros((len(rows), width), np.uint8)
@@ -185,7 +187,7 @@ def widened(rows: Cells, width: int) -> Cells:
 
 @lru_cache(1)
 def _begins() -> npt.NDArray[np.uint32]:
-    """Return four digits as they begin a number, and from 10,000 on, as they follow others."""
+    """Return texts of four digits at the begin of a number, and from 10,000 on, as later digits."""
     numbers, tens = np.arange(_RADIX)[:, np.newaxis], np.array([1_000, 100, 10, 1])
     digits = (numbers // tens % 10 + ord("0")).astype(np.uint8)
     rows = np.concatenate((np.where(numbers >= tens, digits, np.uint8(0)), digits))
@@ -194,7 +196,7 @@ def _begins() -> npt.NDArray[np.uint32]:
 
 @lru_cache(1)
 def _ends() -> npt.NDArray[np.uint32]:
-    """Return four digits without the zeros at their end; one of 0000 stays."""
+    """Return texts of four digits without zeros at the end. For 0000, one zero remains."""
     numbers, tens = np.arange(_RADIX)[:, np.newaxis], np.array([1_000, 100, 10, 1])
     digits = (numbers // tens % 10 + ord("0")).astype(np.uint8)
     rows = np.where((numbers % (10 * tens) != 0) | (tens == 1_000), digits, np.uint8(0))
@@ -202,7 +204,7 @@ def _ends() -> npt.NDArray[np.uint32]:
 
 
 def whole(numbers: npt.NDArray[np.int64]) -> list[Part]:
-    """Write whole numbers, whose amount is below `WHOLE`."""
+    """Write whole numbers whose amount is below `WHOLE`."""
     if not len(numbers) or numbers.min() >= 0:
         return [_digits(numbers)]
     return [where(numbers < 0, b"-"), _digits(np.abs(numbers))]
@@ -227,11 +229,11 @@ class Scale(NamedTuple):
     """The conversion of a whole number to a float: raw * factor + offset.
 
     Attributes:
-        factor: the factor.
-        offset: the offset.
-        tens: the power of ten that makes both whole numbers.
-        times: the factor multiplied by it.
-        more: the offset multiplied by it.
+        factor: factor of the conversion.
+        offset: offset of the conversion.
+        tens: power of ten that makes factor and offset whole numbers.
+        times: factor multiplied by `tens`.
+        more: offset multiplied by `tens`.
     """
 
     factor: float
@@ -242,7 +244,7 @@ class Scale(NamedTuple):
 
     @classmethod
     def of(cls, factor: float, offset: float) -> Scale | None:
-        """Return it; None where the exact numbers have too many digits."""
+        """Return the scale, or None if the exact numbers have too many digits."""
         if not (isfinite(factor) and isfinite(offset) and factor):
             return None
         both = Decimal(repr(factor)), Decimal(repr(offset))
@@ -256,7 +258,10 @@ class Scale(NamedTuple):
 
 
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
-    """Write floats that are made of whole numbers; return the text, and where it is right."""
+    """Write floats that result from whole numbers.
+
+    Return the texts, and which of them are correct.
+    """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)
     right = (numbers <= limit) & (numbers >= -limit)
@@ -272,7 +277,7 @@ def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Ma
 
 
 def _decimals(numbers: npt.NDArray[np.int64], tens: int) -> Cells:
-    """Write what stands behind the point, four or eight digits, without zeros at the end."""
+    """Write four or eight digits after the point, without zeros at the end."""
     if tens == _RADIX:
         return of(_ends()[numbers])
     high = numbers // _RADIX

@@ -1,4 +1,7 @@
-"""What frames in columns mean, as a text for each, the same as frame by frame; needs numpy."""
+"""The meanings of frames in columns, as the same texts as frame by frame.
+
+The module needs numpy.
+"""
 
 from __future__ import annotations
 
@@ -46,21 +49,24 @@ if TYPE_CHECKING:
 
 _Payloads = npt.NDArray[np.uint64]
 _Write = Callable[[cells.Texts, Ints, _Payloads, Ints], None]
-"""Writes what frames mean, by rows, payloads and lengths; remote frames are not among them."""
+"""Function that writes the meanings of frames, except remote frames.
+
+Its arguments are texts, rows, payloads and lengths.
+"""
 
 _FEW: Final = 16
-"""Frames that are decoded one by one sooner than at once."""
+"""Number of frames up to which decoding them one by one is faster."""
 _SETTLED: Final = 256
-"""So many frames are decoded one by one where what a CAN-ID means has changed."""
+"""Number of frames that are decoded one by one after a CAN-ID has changed its meaning."""
 _MOST_LAYOUTS: Final = 1 << 10
-"""Of PDOs whose format strings are kept."""
+"""Number of PDOs whose format strings are kept."""
 
 
 class ColumnMeanings:
-    """Decodes blocks of frames.
+    """Decoder of blocks of frames.
 
     Args:
-        decoder: it may be fed by others in between.
+        decoder: decoder of single frames. Other code may also feed it in between.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -71,7 +77,7 @@ class ColumnMeanings:
         self._pdos: dict[int, tuple[PdoDecoder, _Write]] = {}
 
     def texts(self, columns: Columns) -> cells.Texts:
-        """Return what each frame means, empty where nothing is known."""
+        """Return the meaning of each frame, empty if it is unknown."""
         texts, rows = cells.Texts(len(columns)), np.arange(len(columns))
         if not self._apart:
             self._one_by_one(columns, rows, texts)
@@ -86,7 +92,10 @@ class ColumnMeanings:
             texts.put_one(row, _text(self._decoder, record))
 
     def _take_messages(self, columns: Columns, texts: cells.Texts) -> Ints:
-        """Take error frames, extended ones and those of DBC files; return which rows are left."""
+        """Process error frames, extended frames and frames in DBC files.
+
+        Return the remaining rows.
+        """
         ident = columns.ident
         plain = ident & np.uint32(ERROR) == 0
         self._one_by_one(columns, np.flatnonzero(~plain), texts)
@@ -109,7 +118,7 @@ class ColumnMeanings:
         return np.flatnonzero(left)
 
     def _message(self, can_id: int, extended: bool) -> _Write | None:
-        """Return what writes the frames of a CAN-ID, where a DBC file names it."""
+        """Return a function that writes the frames of a CAN-ID, if a DBC file names the CAN-ID."""
         ident = can_id, extended
         if ident not in self._messages:
             file = next((file for file in self._files if file.names(*ident)), None)
@@ -117,7 +126,7 @@ class ColumnMeanings:
         return self._messages[ident]
 
     def _take_bus(self, bus: BusDecoder, frames: Columns, places: Ints, texts: cells.Texts) -> None:
-        """Decode data and remote frames with 11-bit identifiers, whose places are other rows."""
+        """Decode data and remote frames with 11-bit identifiers. Their places are other rows."""
         begin = 0
         while begin < len(frames):
             begin = self._take_settled(bus, frames, begin, places, texts)
@@ -132,7 +141,7 @@ class ColumnMeanings:
     def _take_settled(
         self, bus: BusDecoder, frames: Columns, begin: int, places: Ints, texts: cells.Texts
     ) -> int:
-        """Decode frames until what a CAN-ID means changes; return the row behind that."""
+        """Decode frames until the meaning of a CAN-ID changes. Return the row after this change."""
         ident = frames.ident[begin:]
         groups, each = list[tuple[Ints, Route]](), list[Ints]()
         for number, found in _groups(ident & np.uint32(STANDARD_MAX)):
@@ -166,7 +175,7 @@ class ColumnMeanings:
         return end
 
     def _settled(self, route: Route, frames: Columns, places: Ints, texts: cells.Texts) -> None:
-        """Write frames of one CAN-ID whose meaning lasts."""
+        """Write frames of one CAN-ID whose meaning does not change."""
         layout = getattr(route, "__self__", None)
         remote = frames.ident & np.uint32(REMOTE) != 0
         lengths = frames.dlc.astype(np.int64)
@@ -190,7 +199,7 @@ class ColumnMeanings:
 
 
 def _alike(numbers: Ints) -> list[Ints]:
-    """Return the rows of each small number."""
+    """Return the rows of each value of some small numbers."""
     present = np.flatnonzero(np.bincount(numbers)).tolist()
     if len(present) == 1:
         return [np.arange(len(numbers))]
@@ -202,7 +211,7 @@ def _text(decoder: Decoder, record: Record) -> str:
 
 
 def _groups(numbers: npt.NDArray[np.uint32]) -> list[tuple[int, Ints]]:
-    """Return each number, and the rows that have it."""
+    """Return each number, and the rows with this number."""
     found, places = np.unique(numbers, return_inverse=True)
     order = np.argsort(places.astype(np.uint16) if len(found) < 1 << 16 else places, kind="stable")
     cuts = np.searchsorted(places[order], np.arange(1, len(found)))
@@ -213,9 +222,9 @@ class _Column(NamedTuple):
     """A signal of many frames.
 
     Attributes:
-        head: its name, and other text before its value.
-        write: returns the text of its value in each payload.
-        unit: the unit, written after the value.
+        head: name of the signal, and other text before the value.
+        write: function that returns the text of the value in each payload.
+        unit: unit of the signal, written after the value.
     """
 
     head: str
@@ -224,7 +233,7 @@ class _Column(NamedTuple):
 
 
 def _writer(begin: str, columns: Sequence[_Column], end: str = "") -> _Write:
-    """Return what writes the signals of frames of one length."""
+    """Return a function that writes the signals of frames of one length."""
 
     def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
         parts, constant = list[cells.Part](), begin
@@ -247,7 +256,10 @@ def _blank_end(text: str) -> bool:
 
 
 def _by_length(make: Callable[[int], _Write]) -> _Write:
-    """Return what writes frames of any length, by what `make` returns for one."""
+    """Return a function that writes frames of any length.
+
+    `make` returns a function for one length.
+    """
     made: dict[int, _Write] = {}
 
     def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
@@ -260,13 +272,13 @@ def _by_length(make: Callable[[int], _Write]) -> _Write:
 
 
 class _Bits(NamedTuple):
-    """Where the bits of a signal are.
+    """The position of a signal in the payload.
 
     Attributes:
-        shift: its lowest bit.
-        length: number of its bits.
-        sign: its sign bit, 0 if it has none.
-        swapped: whether it is big-endian.
+        shift: number of the lowest bit of the signal.
+        length: number of bits of the signal.
+        sign: sign bit of the signal, or 0 if the signal has no sign.
+        swapped: whether the signal is big-endian.
     """
 
     shift: int
@@ -275,23 +287,26 @@ class _Bits(NamedTuple):
     swapped: bool = False
 
     def of(self, payloads: _Payloads) -> _Payloads:
-        """Return the bits as they are in each payload."""
+        """Return the bits of the signal in each payload."""
         if self.swapped:
             payloads = payloads.byteswap()
         return payloads >> np.uint64(self.shift) & np.uint64((1 << self.length) - 1)
 
     def signed(self, bits: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-        """Return the numbers that they are; those of 2^63 and more are negative."""
+        """Return the bits as signed numbers. Bits of 2^63 and more become negative numbers."""
         numbers, sign = bits.view(np.int64), self.sign
         return (numbers ^ sign) - sign if 0 < sign < 1 << 63 else numbers
 
     def number(self, bits: int) -> int:
-        """Return the number that some bits are."""
+        """Return the number that the bits of a value represent."""
         return (bits ^ self.sign) - self.sign
 
 
 def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str = "") -> _Column:
-    """Return a signal whose numbers are written one by one, those of few bits once for all."""
+    """Return a signal whose numbers are written one by one.
+
+    Numbers of few bits are written once.
+    """
 
     def text(raw: int) -> str:
         return write(bits.number(raw))
@@ -305,14 +320,14 @@ def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str 
 def _whole_column(
     head: str, bits: _Bits, scale: tuple[int, int], write: Callable[[int], str], unit: str = ""
 ) -> _Column:
-    """Return a signal that is a whole number, multiplied by a factor, plus an offset.
+    """Return a signal that is a whole number multiplied by a factor, plus an offset.
 
     Args:
-        head: as for a column.
-        bits: bits of the signal.
+        head: text before the value, as for a column.
+        bits: position of the signal.
         scale: factor and offset.
-        write: writes one number as text.
-        unit: as for a column.
+        write: function that writes one number as text.
+        unit: unit of the signal, as for a column.
     """
     times, more = scale
     limit = (cells.WHOLE - abs(more)) // max(1, abs(times))
@@ -334,7 +349,7 @@ def _whole_column(
 def _scaled_column(
     head: str, bits: _Bits, scale: tuple[float, float], write: Callable[[int], str], unit: str = ""
 ) -> _Column:
-    """Return a signal that is a number with decimals; the arguments are as of a whole one."""
+    """Return a signal that is a number with decimals. The arguments are as for a whole number."""
     exact = cells.Scale.of(*scale)
     if exact is None:
         return _each_column(head, bits, write, unit)
@@ -356,7 +371,7 @@ def _scaled_column(
 def _within(
     numbers: npt.NDArray[np.int64], raw: _Payloads, bits: _Bits, limit: int
 ) -> cells.Mask | None:
-    """Return which numbers are at most `limit`; None if all are."""
+    """Return which numbers are at most `limit`, or None if all numbers are."""
     if 1 << bits.length <= limit:
         return None
     right = (numbers <= limit) & (numbers >= -limit)
@@ -368,7 +383,7 @@ def _within(
 def _corrected(
     parts: Sequence[cells.Part], right: cells.Mask, raw: _Payloads, write: Callable[[int], str]
 ) -> cells.Cells:
-    """Return a text in which wrong cells are written again."""
+    """Return a text in which incorrect cells are written again."""
     wrong = np.flatnonzero(~right)
     texts = cells.of_texts(map(write, raw[wrong].tolist()))
     rows = cells.widened(cells.together(len(raw), parts), texts.shape[1])
@@ -380,7 +395,7 @@ def _corrected(
 
 
 def _pdo_writer(layout: PdoDecoder) -> _Write:
-    """Return what writes the frames of a PDO."""
+    """Return a function that writes the frames of a PDO."""
 
     def decode(data: bytes) -> Decoded:
         return layout.decode(0, CanFrame(0, data))
@@ -397,7 +412,7 @@ def _pdo_writer(layout: PdoDecoder) -> _Write:
 
 
 def _field_column(field: Field) -> _Column | None:
-    """Return how a signal of a PDO is written; None for texts."""
+    """Return a function that writes a signal of a PDO, or None for texts."""
     name, shift, mask, sign, convert, unit, text = field
     if shift >= 8 * MAX_DATA_BYTES or not isinstance(convert(0) if convert else 0, int | float):
         return None
@@ -451,7 +466,7 @@ def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
 
 
 def _message_columns(message: DbcMessage, length: int) -> list[_Column] | None:
-    """Return the signals in data of this length; None if cantools must find them."""
+    """Return the signals in data of this length, or None if cantools must find them."""
     if message.is_multiplexed() or message.is_container or message.length > MAX_DATA_BYTES:
         return None
     columns = []
@@ -468,7 +483,7 @@ def _message_columns(message: DbcMessage, length: int) -> list[_Column] | None:
 
 
 def _signal_column(signal: SignalOfDbc, start: int, swapped: bool) -> _Column | None:
-    """Return how a signal is written; None where cantools must do it."""
+    """Return a function that writes a signal, or None if cantools must write it."""
     choices: Mapping[int, object] = signal.choices or {}
     unit, floats = signal.unit or "", signal.is_float
     blank = any(map(_blank_end, (unit, *map(str, choices.values()))))
@@ -491,7 +506,7 @@ def _signal_column(signal: SignalOfDbc, start: int, swapped: bool) -> _Column | 
 
 
 def _scaled(signal: SignalOfDbc, raw: int) -> str:
-    """Write a signal as cantools scales it, with its unit."""
+    """Write a signal with its unit, scaled as cantools scales it."""
     number: int | float = raw
     if signal.is_float:
         (number,) = unpack(_FLOATS[signal.length], raw.to_bytes(signal.length // 8, "little"))
@@ -501,11 +516,11 @@ def _scaled(signal: SignalOfDbc, raw: int) -> str:
 
 
 _MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
-"""Words of which the first bytes are wanted."""
+"""Masks for the first bytes of a word."""
 
 
 def _single(decode: Callable[[bytes], Decoded], length: int) -> _Write:
-    """Return what decodes frames of a length one by one."""
+    """Return a function that decodes frames of one length one by one."""
 
     def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
         for row, payload in zip(rows.tolist(), payloads.tolist(), strict=True):
@@ -521,17 +536,17 @@ def _single(decode: Callable[[bytes], Decoded], length: int) -> _Write:
 # The node board of a log in blocks: only frames that can change it are decoded; needs numpy.
 
 _PIECE: Final = 1 << 10
-"""Frames in Python at once."""
+"""Number of frames that are handled in Python at once."""
 
 
 class ColumnNodes:
-    """Feeds a node board with blocks; the final result is the same as frame by frame.
+    """Feed of a node board with blocks. The final result is the same as frame by frame.
 
     `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
 
     Args:
-        decoder: it must be `standard`.
-        board: the board; no other code feeds it.
+        decoder: decoder for which `standard` is true.
+        board: node board. No other code may feed the board.
     """
 
     def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
@@ -557,7 +572,7 @@ class ColumnNodes:
                 return
 
     def _feed(self, frames: Columns, rows: Ints) -> None:
-        """Take frames whatever they mean."""
+        """Process frames regardless of their meaning."""
         for _, record in one_by_one(frames, rows):
             self._board.take(record, self._decoder.take(record))
 
@@ -570,7 +585,7 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Expedited SDO transfers that add no knowledge; each answer directly follows its request.
+    """Expedited SDO transfers that add no knowledge. Each answer directly follows its request.
 
     Attributes:
         requests: positions of the requests.
@@ -596,14 +611,14 @@ def _commands(*commands: tuple[int, Iterable[int]]) -> npt.NDArray[np.uint8]:
 
 
 _SIZES: Final = (0x02, 0x03, 0x07, 0x0B, 0x0F)
-"""Low bits of an expedited initiate: no size, or 4 to 1 bytes."""
+"""Low bits of an expedited initiate, for no size, or for 4 to 1 bytes."""
 _REQUESTS: Final = _commands((_UPLOADS, [0x40]), (_DOWNLOADS, [0x20 | one for one in _SIZES]))
 _ANSWERS: Final = _commands((_UPLOADS, [0x40 | one for one in _SIZES]), (_DOWNLOADS, [0x60]))
 _BLOCK_COMMANDS: Final = (0xA0, 0xC0)
 _SPECIFIER: Final = 0xE0
 _WHOLE: Final = 8
 _COMMUNICATION: Final = 0x1
-"""First digit of the objects of which the decoder learns."""
+"""First digit of the index of objects from which the decoder learns."""
 _STATUSWORD: Final = 0x6041
 """Index and sub-index, in the order of the frame."""
 
@@ -614,19 +629,20 @@ def exchanges(
     payload: npt.NDArray[np.uint64],
     blocks: npt.NDArray[np.bool_],
 ) -> Exchanges:
-    """Return the exchanges among SDO frames of the pre-defined connection set.
+    """Return the exchanges in SDO frames of the pre-defined connection set.
 
     A client that polls a node causes most SDO frames of a log. Of several such exchanges in a row,
     the inner ones only add to the count.
 
-    Never left out are reads of 1000h to 1FFFh, a statusword that differs from the previous one, and
-    all exchanges of a node with block transfers, whose segments may contain any data.
+    Exchanges that are never left out are reads of 1000h to 1FFFh, a statusword that differs from
+    the previous one, and all exchanges of a node with block transfers, whose segments may contain
+    any data.
 
     Args:
-        ident: identifiers with flags; only SDO frames.
-        dlc: bytes of data.
-        payload: data as a little-endian number.
-        blocks: by node-ID, whether it has block transfers, as `block_nodes` says.
+        ident: identifiers with flags of SDO frames only.
+        dlc: number of data bytes.
+        payload: data of each frame as a little-endian number.
+        blocks: whether a node has block transfers, as `block_nodes` returns it, by node-ID.
     """
     nodes = (ident & 0x7F).astype(np.uint8)
     order = np.argsort(nodes, kind="stable")
@@ -675,7 +691,7 @@ def of_sdo(ident: npt.NDArray[Any]) -> Ints:
 
 
 class Matter(NamedTuple):
-    """The frames that matter.
+    """The frames that can change knowledge.
 
     Attributes:
         rows: rows of frames that can change the knowledge about nodes.
@@ -690,9 +706,9 @@ def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Ma
     """Find the frames that can change the knowledge about nodes.
 
     Args:
-        bus: decodes the frames.
+        bus: decoder of the bus.
         frames: frames of one bus.
-        but: rows to leave out: frames that do not change the state of PDOs.
+        but: rows to leave out, which are frames that do not change the state of PDOs.
     """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

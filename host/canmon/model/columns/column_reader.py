@@ -1,4 +1,4 @@
-"""Read a log file as columns, many lines at a time.
+"""Reader of log files as columns, many lines at a time.
 
 A candump log is read in blocks. The usual lines of a block are parsed all at once (`CandumpBlock`).
 The parser of single lines parses every other line, so that the result is the same, frame for frame.
@@ -39,24 +39,24 @@ from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 # an error frame, a size that does not fit) makes the container one for the reader of frames.
 
 _FRAMES: Final = (1, 86)
-"""CAN_MESSAGE, CAN_MESSAGE2."""
+"""Types of objects with frames, CAN_MESSAGE and CAN_MESSAGE2."""
 
 _SIGNATURE: Final = int.from_bytes(b"LOBJ", "little")
 _PADDED: Final = 4
-"""An object begins at most so far behind the end of the one before."""
+"""Largest distance from the end of an object to the begin of the next object."""
 _SEARCHED: Final = 8
 
 _HEADERS: Final = (32, 40)
-"""Bytes of both headers, by their version, from 1."""
+"""Number of bytes of both headers, by header version from 1."""
 _BODY: Final = 16
 _IN_10_US: Final = 1
 _SENT, _REMOTE_FRAME = 0x01, 0x80
 _EXACT: Final = 1 << 53
-"""Below it a stamp is exact as a floating-point number."""
+"""Number below which a time stamp is exact as a floating-point number."""
 
 _PLAIN, _FRAME, _NOTE, _ODD = range(4)
 _KINDS: Final = np.full(256, _PLAIN, np.uint8)
-"""What an object is, by its type; the last entry is of all beyond."""
+"""Kind of an object by its type. The last entry is for all larger types."""
 _KINDS[list(_FRAMES)], _KINDS[list(can_log.BLF_NOTES)], _KINDS[list(can_log.BLF_FRAMES)] = (
     _FRAME,
     _NOTE,
@@ -65,11 +65,11 @@ _KINDS[list(_FRAMES)], _KINDS[list(can_log.BLF_NOTES)], _KINDS[list(can_log.BLF_
 
 
 class _Objects:
-    """Objects in a log; each field can be read from all of them at once.
+    """The objects in a log. Each field can be read from all objects at once.
 
     Args:
-        data: the bytes that contain the objects.
-        places: offset of each object.
+        data: bytes that contain the objects.
+        places: offset of each object in the bytes.
         stride: distance between two objects, if it is the same for all. A field is then a view,
             which takes a fifth of the time of gathering its values.
     """
@@ -78,7 +78,7 @@ class _Objects:
         self.data, self.places, self._stride = data, places, stride
 
     def field(self, code: str, offset: int) -> npt.NDArray[Any]:
-        """Return the numbers at a place behind the beginning of each object."""
+        """Return the numbers at an offset from the beginning of each object."""
         if self._stride:
             begin = int(self.places[0]) + offset
             shape, strides = (len(self.places),), (self._stride,)
@@ -89,19 +89,19 @@ class _Objects:
         ]
 
     def select(self, rows: _Places) -> _Objects:
-        """Return some of them."""
+        """Return some of the objects."""
         whole = len(rows) == len(self.places)
         return self if whole else _Objects(self.data, self.places[rows])
 
 
 class BlfBlocks:
-    """Takes containers apart; called with their contents and the time of the beginning in s."""
+    """Parser of containers. It is called with their contents and the time of the beginning in s."""
 
     def __init__(self, channels: ChannelNames) -> None:
         self._channels = channels
 
     def __call__(self, data: bytes, start_s: float) -> can_log.BlfBlock | None:
-        """Return the frames; None where they are to be read one by one."""
+        """Return the frames, or None if the frames must be read one by one."""
         found = _alike(data) or _aligned(data) or _anywhere(data)
         if found is None:
             return None
@@ -124,7 +124,7 @@ class BlfBlocks:
         return can_log.BlfBlock(rows, len(rows.known), noted, end)
 
     def _rows(self, frames: _Objects, start_s: float) -> Rows | None:
-        """Return a row for each frame; None where one is not as usual."""
+        """Return a row for each frame, or None if an object is unusual."""
         rows = Rows(len(frames.places))
         if not len(frames.places):
             return rows
@@ -156,7 +156,7 @@ class BlfBlocks:
 
 
 def _alike(data: bytes) -> _Objects | None:
-    """Return the objects where all have the size of the first, as python-can writes them."""
+    """Return the objects if all have the size of the first one, as in files of python-can."""
     if len(data) < 2 * can_log.OBJECT_BYTES:
         return None
     size = int.from_bytes(data[8:12], "little")
@@ -185,7 +185,7 @@ def _aligned(data: bytes) -> _Objects | None:
 
 
 def _anywhere(data: bytes) -> _Objects | None:
-    """Return the objects with the padding that python-can passes over."""
+    """Return the objects with the padding that python-can skips."""
     if len(data) < can_log.OBJECT_BYTES:
         return None
     words = np.ndarray((len(data) - 3,), "<u4", data, 0, (1,))
@@ -194,12 +194,12 @@ def _anywhere(data: bytes) -> _Objects | None:
 
 
 def _whole(data: bytes, places: _Places, padded: int) -> _Objects | None:
-    """Return the complete objects; None if the data after an object are unclear.
+    """Return the complete objects, or None if the data after an object are unclear.
 
     Args:
         data: the bytes that contain the objects.
-        places: offsets of all signatures; the first one belongs to an object.
-        padded: bytes that may be between two objects.
+        places: offset of each signature. The first signature belongs to an object.
+        padded: number of bytes that may be between two objects.
     """
     places = places[places <= len(data) - can_log.OBJECT_BYTES]
     ends = places + _Objects(data, places).field("<u4", 8)
@@ -208,13 +208,13 @@ def _whole(data: bytes, places: _Places, padded: int) -> _Objects | None:
 
 
 def _chain(places: _Places, ends: _Places, length: int, padded: int) -> _Places | None:
-    """Return which signatures begin complete, consecutive objects; None if that is unclear.
+    """Return which signatures begin complete, consecutive objects, or None if that is unclear.
 
     Args:
-        places: offsets of all signatures.
-        ends: where the object of each signature would end.
+        places: offset of each signature.
+        ends: end that the object of each signature would have.
         length: length of the data.
-        padded: bytes that may be between two objects.
+        padded: number of bytes that may be between two objects.
     """
     if not len(places) or (ends - places < can_log.OBJECT_BYTES).any():
         return None
@@ -248,7 +248,7 @@ _DOT: Final = 11
 _CHANNEL: Final = 20
 _LONGEST_NAME: Final = 16
 _PADDING: Final = b"\n" * 48
-"""Places and words reach so far behind a short last line."""
+"""Padding after a short last line, because words are read beyond its end."""
 
 _NO_DIGIT: Final = 0x80
 _VALUES: Final = bytes(
@@ -256,7 +256,7 @@ _VALUES: Final = bytes(
     for byte in range(256)
 )
 _MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
-"""Words of which the first bytes are wanted."""
+"""Masks for the first bytes of a word."""
 
 
 def _word(text: bytes) -> np.uint64:
@@ -278,7 +278,7 @@ _4, _8, _16, _32 = np.uint64(4), np.uint64(8), np.uint64(16), np.uint64(32)
 
 
 class CandumpBlock:
-    """Complete lines of a candump log, parsed all at once.
+    """Complete lines of a candump log, which are parsed all at once.
 
     A line that candump writes has its fields at fixed positions:
 
@@ -288,14 +288,14 @@ class CandumpBlock:
     Each field is read from all lines at once, as words of eight bytes at any address. Before that,
     a table converts hex digits to their values, and all other characters to 0x80. One AND then
     checks eight digits. Shifts within the words combine the values of two, four and eight digits.
-    The parser of single lines reads a line that fails a check.
+    If a line fails a check, the parser of single lines reads that line.
 
     Args:
-        text: the lines, each with its LF.
+        text: lines of the log, each with its LF.
 
     Attributes:
         starts: offset of each line.
-        ends: end of the data in each line, before LF, CR and a direction.
+        ends: end of the data in each line, before LF, CR and a direction character.
     """
 
     def __init__(self, text: bytes) -> None:
@@ -314,11 +314,11 @@ class CandumpBlock:
         self._lines_end = ends
 
     def line(self, row: int) -> str:
-        """Return a line."""
+        """Return the text of a line."""
         return self._text[self.starts[row] : self._lines_end[row]].decode("latin-1")
 
     def take(self, rows: Rows, channels: ChannelNames) -> None:
-        """Write the rows of the lines that are as candump writes them."""
+        """Write the rows of the lines that have the form of candump."""
         marks, known = self._marks()
         rows.at_us[:], fits = self._stamps()
         known &= fits
@@ -332,7 +332,7 @@ class CandumpBlock:
         rows.sent[:], rows.known[:] = self._sent, known
 
     def _marks(self) -> tuple[_Places, _Flags]:
-        """Return the place of the first # of each line, and whether it has one."""
+        """Return the position of the first # of each line, and whether the line has a #."""
         marks = np.flatnonzero(self._raw[: len(self._text)] == ord("#"))
         if len(marks) != len(self.starts) or (marks < self.starts).any():
             marks = np.append(marks, len(self._text))
@@ -341,7 +341,7 @@ class CandumpBlock:
         return np.where(known, marks, _CHANNEL), known
 
     def _stamps(self) -> tuple[_Places, _Flags]:
-        """Return times: eight digits, then two before the dot and six behind it."""
+        """Return times from eight digits, two digits before the dot, and six digits after it."""
         starts = self.starts
         high = self._value_words[starts + 1]
         low = self._value_words[starts + 9] & _FIRST_TWO
@@ -354,7 +354,7 @@ class CandumpBlock:
         return at_us.view(np.int64), known
 
     def _idents(self, marks: _Places, standard: _Flags) -> tuple[_Words, _Flags]:
-        """Return identifiers with the flag of extended ones."""
+        """Return identifiers with the flag of extended identifiers."""
         digits = self._value_words[marks - 8]
         digits = np.where(standard, digits & _LAST_THREE, digits)
         known = digits & _NOT_HEX == 0
@@ -365,7 +365,7 @@ class CandumpBlock:
         return can_ids | np.where(standard, np.uint64(0), np.uint64(EXTENDED)), known
 
     def _data(self, marks: _Places) -> tuple[_Words, _Places, _Flags]:
-        """Return data as numbers, and lengths."""
+        """Return data as numbers, and the lengths of the data."""
         digits = self.ends - marks - 1
         known = (digits & 1 == 0) & (digits <= 16) & (digits >= 0)
         low = self._value_words[marks + 1] & _MASKS[np.clip(digits, 0, 8)]
@@ -374,7 +374,7 @@ class CandumpBlock:
         return _bytes(low) | _bytes(high) << _32, digits >> 1, known
 
     def _name(self, ends: _Places, known: _Flags, rows: Rows, channels: ChannelNames) -> None:
-        """Write the places of the buses; lines with unusual names are none of these."""
+        """Write the numbers of the buses. Lines with unusual names of buses are left out."""
         starts = self.starts + _CHANNEL
         lengths = ends - starts
         known &= (lengths > 0) & (lengths <= _LONGEST_NAME)
@@ -405,43 +405,43 @@ def _decimal(digits: _Words) -> _Words:
 
 
 def _bytes(digits: _Words) -> _Words:
-    """Return four bytes of eight hex digits each, the first one lowest."""
+    """Return four bytes from eight hex digits each. The first byte is the lowest."""
     values = (digits << _4 | digits >> _8) & _BYTES
     values = (values | values >> _8) & _PAIRS
     return (values | values >> _16) & _FOURS
 
 
 BLOCK_BYTES: Final = 1 << 20
-"""Some 23 000 lines: what is computed of them stays in the cache, and numpy's calls cost little."""
+"""Size of a block of some 23 000 lines, whose results fit into the cache of the processor."""
 
 _BATCH: Final = 1 << 14
-"""Frames of a block of other formats; of half as many statistics take a third longer."""
+"""Frames of a block of other formats. With half as many frames, statistics take a third longer."""
 
 _ITEMS: Final = 1 << 10
-"""Frames of a piece that is no columns."""
+"""Frames of a piece that is not in columns."""
 
 
 def read_columns(path: Path) -> ColumnReader:
-    """Return a reader of a log file; nothing is opened yet.
+    """Return a reader of a log file. The file is not opened yet.
 
     Raises:
-        LogFormatError: the file's name tells no format.
+        LogFormatError: the name of the file indicates no format.
     """
     return ColumnReader(path, log_file.log_format(path))
 
 
 class ColumnReader:
-    """An iterable of blocks of a log; it reads while it is iterated, and only once.
+    """An iterable of blocks of a log, which reads the file during the iteration, and only once.
 
-    It holds one block in memory, regardless of the size of the file.
+    The reader holds one block in memory, regardless of the size of the file.
 
     Attributes:
-        tally: counts items that are not frames.
+        tally: counts of items that are not frames.
 
     Raises:
         OSError: during iteration: the file cannot be read.
-        LogError: during iteration: the content does not match the file's name, or has more than 256
-            buses.
+        LogError: during iteration: the content does not match the name of the file, or has more
+            than 256 buses.
         NoColumnsError: during iteration: the log contains a CAN FD frame.
     """
 
@@ -456,7 +456,7 @@ class ColumnReader:
             yield rows.columns(self._channels)
 
     def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Read the file, with the marks among its frames; pieces with marks are returned as frames.
+        """Read the file with the marks among its frames. Pieces with marks are returned as frames.
 
         Pieces with CAN FD frames, and formats that cannot be read as columns, are returned as
         frames, too.
@@ -486,11 +486,11 @@ class ColumnReader:
     def _piece(
         self, text: bytes, lines: log_reader.LogLines, held: int
     ) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Return the frames of some lines: as columns if the lines hold only frames.
+        """Return the frames of some lines, as columns if the lines hold only frames.
 
         Args:
-            text: the lines, each with its LF.
-            lines: reads the lines, or counts them.
+            text: lines of the log, each with its LF.
+            lines: reader that reads or counts the lines.
             held: number of bytes at the start of the text that were read before.
         """
         block = CandumpBlock(text)
@@ -543,7 +543,7 @@ class ColumnReader:
             raise failed
 
     def _of_frames(self) -> Iterator[Rows]:
-        """Read frames, or many of them together where the format has columns, in pieces."""
+        """Read frames in pieces, with many frames together if the format supports columns."""
         reader, failed = log_reader.read_log(self._path), None
         frames, rows, singles = self._frames(reader), list[Rows](), list[Record]()
         more = True
@@ -596,7 +596,7 @@ class ColumnReader:
             yield self._take_apart(rest + b"\n", number, clock or _clock_of(rest))
 
     def _take_apart(self, text: bytes, number: int, clock: ScreenClock) -> Rows:
-        """Return a row for each line; `number` lines are before them."""
+        """Return a row for each line. `number` is the number of lines before these lines."""
         block = CandumpBlock(text)
         rows = Rows(len(block.starts))
         block.take(rows, self._channels)

@@ -1,4 +1,7 @@
-"""A survey of a log in blocks: only frames that change it are decoded one by one; needs numpy."""
+"""Survey of a log in blocks. Only frames that change the survey are decoded one by one.
+
+The module needs numpy.
+"""
 
 from __future__ import annotations
 
@@ -43,17 +46,17 @@ _PIECE: Final = 1 << 10
 _NO_ROW: Final = -1
 _NODE: Final = 0x7F
 _WRITTEN: Final = 0x60
-"""The command of the answer to a download."""
+"""Command byte of the answer to a download."""
 _DRIVE_STATES: Final = tuple(drive_state(bits) or "?" for bits in range(0x80))
 _Values = npt.NDArray[np.float64]
 
 
 class ColumnSurvey:
-    """Feeds a survey with blocks.
+    """Feed of a survey with blocks.
 
     Args:
-        decoder: of the survey; only DBC files may decode before the standard.
-        survey: the survey; no other code feeds it.
+        decoder: decoder of the survey. Only DBC files may come before the standard.
+        survey: survey to feed. No other code may feed the survey.
     """
 
     def __init__(self, decoder: Decoder, survey: Survey) -> None:
@@ -104,7 +107,10 @@ class ColumnSurvey:
             survey.counts.add_at((channel, kind >> 16), kind & 0xFFFF, count)
 
     def _unnamed(self, columns: Columns) -> Columns:
-        """Take what DBC files name, frame by frame; return the rest without error frames."""
+        """Process frames that DBC files name, frame by frame.
+
+        Return the other frames except error frames.
+        """
         plain = columns.ident & np.uint32(ERROR) == 0
         named = np.zeros(len(columns), np.bool_)
         for ident in np.unique(columns.ident[plain]).tolist() if self._files else ():
@@ -140,7 +146,7 @@ class ColumnSurvey:
             frames = select(frames, np.arange(end + len(each), len(frames)))
 
     def _matter(self, channel: str, bus: BusDecoder, frames: Columns) -> Iterator[int]:
-        """Take the frames that change anything; yield the row of each."""
+        """Process the frames that change anything. Yield the row of each such frame."""
         polls = self._polls(channel, bus, frames)
         asked, kept = np.full(len(frames), _NO_ROW), np.zeros(len(frames), np.bool_)
         quiet = np.concatenate((polls.requests, polls.answers))
@@ -167,7 +173,7 @@ class ColumnSurvey:
                 yield row
 
     def _polls(self, channel: str, bus: BusDecoder, frames: Columns) -> Exchanges:
-        """Return the SDO exchanges that teach nothing."""
+        """Return the SDO exchanges that add no knowledge."""
         rows = of_sdo(frames.ident[: 0 if bus.sdo_moved else len(frames)])
         parts = frames.ident[rows], frames.dlc[rows], frames.payload[rows]
         found = exchanges(*parts, self._blocks[channel])
@@ -181,7 +187,9 @@ class ColumnSurvey:
         answer: int,
         states: dict[tuple[int, int], bool],
     ) -> bool:
-        """Count an exchange by its answer; return False if it must be read frame by frame.
+        """Count an exchange by its answer.
+
+        Return False if the exchange must be read frame by frame.
 
         `states` stores which objects are statuswords. The node board shows the state in them.
         """
@@ -249,7 +257,7 @@ class ColumnSurvey:
 
 
 def _layouts(bus: BusDecoder, frames: Columns) -> dict[int, PdoDecoder]:
-    """Return the PDOs among the CAN-IDs of frames, as they are known now."""
+    """Return the PDOs among the CAN-IDs of frames, with their current mapping."""
     can_ids = np.flatnonzero(np.bincount((frames.ident & np.uint32(STANDARD_MAX)).astype(np.int64)))
     found = {}
     for can_id in can_ids.tolist():
@@ -260,7 +268,7 @@ def _layouts(bus: BusDecoder, frames: Columns) -> dict[int, PdoDecoder]:
 
 
 def _values(one: Field, payloads: npt.NDArray[np.uint64]) -> _Values | None:
-    """Return the numbers that a field has in many payloads; None for texts."""
+    """Return the numbers of a field in many payloads, or None for texts."""
     raw = payloads >> np.uint64(one.shift) & np.uint64(one.mask & (1 << 64) - 1)
     if one.convert is None:
         if not one.sign:
@@ -276,7 +284,7 @@ def _values(one: Field, payloads: npt.NDArray[np.uint64]) -> _Values | None:
 
 
 def _add(bins: TimeBins[str], key: str, since_us: Ints, amounts: Ints) -> None:
-    """Add amounts to the spans of their times."""
+    """Add amounts to the spans that contain their times."""
     if not len(since_us):
         return
     places = since_us // bins.width_us

@@ -1,4 +1,7 @@
-"""Lines of text from columns, many at once, to the byte as frame by frame; needs numpy."""
+"""Lines of text from columns, identical to lines that are written frame by frame.
+
+The module needs numpy.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_
 # It takes 0.3 us a frame, where writing each line takes 3 us.
 
 _ABSENT: Final = 256
-"""The row of a byte that is not there."""
+"""Row of the table for a byte that does not exist."""
 
 
 _PAIRS: Final = cells.table([*(f"{byte:02X}" for byte in range(256)), ""], "<u2")
@@ -33,16 +36,16 @@ _BLANKS: Final = np.array([b" " * count for count in range(frames.DATA_WIDTH + 3
 
 
 _SLAB: Final = 1 << 12
-"""Lines that are written at once; what is made of them stays in the cache of the processor."""
+"""Number of lines that are written at once. Their intermediate results fit into the cache."""
 
 
 def fits(columns: Columns) -> bool:
-    """Return whether these lines can be written at once: not with unusual names of buses."""
+    """Return whether lines can be written at once. Unusual names of buses prevent this."""
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 
 def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[cells.Part]:
-    """Write times of at least 0, whose seconds have a form of their own."""
+    """Write times of at least 0. Their seconds have a format of their own."""
     seconds = span_us // 1_000_000
     micros = span_us - seconds * 1_000_000
     high, low = np.divmod(micros, 1_000)
@@ -60,7 +63,7 @@ def _channels(columns: Columns) -> cells.Part:
 
 
 def _octets(columns: Columns, remote: cells.Mask, blank: bytes = b"") -> cells.Cells:
-    """Write the bytes of the data, each behind a blank or none."""
+    """Write the bytes of the data, with or without a blank before each byte."""
     octets = columns.payload.astype("<u8").view(np.uint8).reshape(-1, MAX_DATA_BYTES)
     lengths = np.where(remote, 0, columns.dlc)
     there = np.arange(MAX_DATA_BYTES) < lengths[:, np.newaxis]
@@ -74,7 +77,7 @@ def _octets(columns: Columns, remote: cells.Mask, blank: bytes = b"") -> cells.C
 
 
 def _idents(ident: npt.NDArray[np.uint32]) -> tuple[cells.Cells, cells.Mask]:
-    """Write identifiers of three or eight digits, and say which have eight."""
+    """Write identifiers of three or eight digits. Return which identifiers have eight digits."""
     long = ident & np.uint32(frames.EXTENDED | frames.ERROR) != 0
     short = cells.of(_STANDARD[ident & STANDARD_MAX])[:, :3]
     if not long.any():
@@ -114,10 +117,10 @@ def log_lines(columns: Columns) -> str:
 
 
 class ScreenText:
-    """Writes lines as `DumpLines` does, and takes turns with it.
+    """Writer of the same lines as `DumpLines`, used alternately with it.
 
     Args:
-        lines: writes single frames.
+        lines: writer of single frames.
     """
 
     def __init__(self, lines: frames.DumpLines) -> None:
@@ -127,8 +130,9 @@ class ScreenText:
         """Write frames, each line with its end.
 
         Args:
-            columns: the frames.
-            meanings: text after each frame, empty for no text; None if no frame has text.
+            columns: frames to write.
+            meanings: text after each frame, empty for no text. None stands for frames without any
+                text.
         """
         for begin in range(0, len(columns), _SLAB):
             rows = slice(begin, begin + _SLAB)
@@ -156,7 +160,7 @@ class ScreenText:
         return meanings.lines(rows, [*parts, *data, cells.of(_BLANKS[blanks])])
 
     def _indents(self, long: cells.Mask) -> list[cells.Part]:
-        """Return what stands before identifiers of three digits once one of eight was there."""
+        """Return the blanks before identifiers of three digits, once one of eight has occurred."""
         lines = self._lines
         if lines.width > len("7FF"):
             return [cells.where(long, b"", b"     ")]
@@ -187,10 +191,10 @@ class ScreenText:
 
 
 class ColumnText:
-    """Frames as a writer of a log takes them, one at least; see `TextBlock`.
+    """Frames for a writer of a log, with at least one frame; see `TextBlock`.
 
     Args:
-        columns: the frames.
+        columns: frames to write.
     """
 
     def __init__(self, columns: Columns) -> None:
@@ -200,7 +204,7 @@ class ColumnText:
         self.errors = bool((columns.ident & np.uint32(frames.ERROR)).any())
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
         return len(self._columns)
 
     def log_lines(self) -> str:
@@ -208,7 +212,7 @@ class ColumnText:
         return log_lines(self._columns)
 
     def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
-        """Write lines as a log of Vector's has them."""
+        """Write lines in the format of a Vector log."""
         return _asc_lines(self._columns, begin_us, number)
 
 
@@ -216,9 +220,9 @@ def _asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) ->
     """Write data and remote frames as lines of a Vector log, each line with its end.
 
     Args:
-        columns: the frames; no frame is earlier than the beginning of the log.
-        begin_us: beginning of the log.
-        number: returns the number of a bus, from 0.
+        columns: frames to write. No frame is earlier than the beginning of the log.
+        begin_us: time of the beginning of the log.
+        number: function that returns the number of a bus, from 0.
     """
     ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
     numbers, firsts = np.zeros(len(columns.channels), np.int64), np.unique(columns.channel, True)[1]

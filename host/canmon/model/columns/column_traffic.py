@@ -1,8 +1,10 @@
-"""Statistics and nodes of logs in blocks, equal to `Traffic` and `NodeBoard`; needs numpy.
+"""Statistics and nodes of logs in blocks, equal to `Traffic` and `NodeBoard`.
 
-The memory does not grow with the number of gaps. It holds sums, the shortest and the longest gap,
-which are exact, and the number of gaps in each bucket (see `gaps`). A quantile is therefore at most
-one part in 64 too long, and exact below 128 us.
+The module needs numpy.
+
+The memory does not grow with the number of gaps. The module holds sums, the shortest and the
+longest gap, which are exact, and the number of gaps in each bucket (see `gaps`). A quantile is
+therefore at most one part in 64 too long, and exact below 128 us.
 
 A histogram of whole microseconds would be exact only up to its longest time, and exact quantiles
 would require a second pass over the log.
@@ -38,10 +40,10 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 
 
 _BLOCK: Final = 1 << 14
-"""Frames at a time: what is computed of them stays in the cache."""
+"""Number of frames that are processed at a time, so that results fit into the cache."""
 
 _HEAD_BYTES: Final = (3, 5)
-"""Bytes in front of the data, 11-bit and 29-bit."""
+"""Number of header bytes before the data, for 11-bit and 29-bit identifiers."""
 
 _Ints = npt.NDArray[np.int64]
 
@@ -55,7 +57,7 @@ def column_bits(
     """Return the bits of each frame with stuff bits and interframe space.
 
     Args:
-        ident: see `ident_of`.
+        ident: identifiers as `ident_of` returns them.
         dlc: data length codes, also of remote frames.
         payload: data bytes as a little-endian number; missing bytes are 0.
     """
@@ -111,7 +113,10 @@ def _feed(columns: list[_Ints], extended: bool) -> _Ints:
 
 @lru_cache
 def _crc_tables(length: int) -> tuple[_Ints, ...]:
-    """Return a table for each byte of a stream; the CRC is linear, so what they give is xored."""
+    """Return a table for each byte of a stream.
+
+    The CRC is linear, so its parts are combined by XOR.
+    """
     return tuple(
         np.array([can.crc16(bytes([byte]) + bytes(behind)) for byte in range(256)], np.int64)
         for behind in reversed(range(length))
@@ -124,23 +129,23 @@ def _crc_tables(length: int) -> tuple[_Ints, ...]:
 _MANTISSA_BITS: Final = 52
 _EXPONENT_BIAS: Final = 1023
 _COARSE: Final = -1 << 12
-"""Leaves as many bits of the longest times as the mantissa has."""
+"""Mask that leaves as many bits of the longest times as the mantissa has."""
 
 _BUCKET_BITS: Final = 12
 _BUCKET_MASK: Final = (1 << _BUCKET_BITS) - 1
-"""All buckets there are."""
+"""Mask of all bucket numbers."""
 
 _MERGED: Final = 1 << 16
-"""Counts at least that are added up at once."""
+"""Smallest number of counts that are added up at once."""
 
 _LONGEST_US: Final = np.iinfo(np.int64).max
 
 
 class _ColumnGaps:
-    """Counts the gaps of each identifier of a bus.
+    """Counter of the gaps of each identifier of a bus.
 
     Attributes:
-        latest_us: the latest gap of each.
+        latest_us: latest gap of each identifier.
     """
 
     def __init__(self) -> None:
@@ -150,7 +155,7 @@ class _ColumnGaps:
         self._new: list[tuple[Ints, Ints]] = []
 
     def take(self, runs: Runs, count: int) -> None:
-        """Count the gaps of a block; there are `count` identifiers now."""
+        """Count the gaps of a block. `count` is the current number of identifiers."""
         self._grow(count)
         numbers, gaps_us, firsts = runs.numbers, runs.gaps_us, runs.begins[runs.fresh]
         self._total_us[numbers] += runs.sums(gaps_us)
@@ -168,7 +173,7 @@ class _ColumnGaps:
         self._min_us[numbers] = np.minimum(self._min_us[numbers], shortest)
 
     def rows(self) -> Iterator[Gaps]:
-        """Yield what was counted of each identifier."""
+        """Yield the results for each identifier."""
         self._merge()
         yield from map(self._row, range(len(self._frames)))
 
@@ -181,7 +186,7 @@ class _ColumnGaps:
         self._min_us, self._max_us = grown(self._min_us, count), grown(self._max_us, count)
 
     def _wander(self, runs: Runs) -> Ints:
-        """Return how much each gap differs from the one before; 0 of a first gap."""
+        """Return the difference of each gap from the previous gap, with 0 for a first gap."""
         wander_us = np.abs(np.diff(runs.gaps_us, prepend=0))
         begins, frames = runs.begins, self._frames[runs.numbers]
         across = np.abs(runs.gaps_us[begins] - self.latest_us[runs.numbers])
@@ -191,7 +196,7 @@ class _ColumnGaps:
         return wander_us
 
     def _count(self, runs: Runs, buckets: npt.NDArray[np.int16]) -> None:
-        """Count what fell into each bucket of each identifier."""
+        """Count the gaps in each bucket of each identifier."""
         # 32 bits are sorted three times as fast as 64.
         places = np.repeat(
             np.arange(len(runs.numbers), dtype=np.int32) << _BUCKET_BITS, runs.lengths
@@ -207,7 +212,7 @@ class _ColumnGaps:
             self._merge()
 
     def _merge(self) -> None:
-        """Add up what is new; seldom enough that it takes no longer where buckets are many."""
+        """Add up new counts. This is done rarely, so that many buckets cost little time."""
         keys = np.concatenate([self._keys, *(new for new, _ in self._new)])
         counts = np.concatenate([self._counts, *(new for _, new in self._new)])
         order = np.argsort(keys, kind="stable")  # it merges what is sorted already
@@ -235,9 +240,9 @@ class _ColumnGaps:
 def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     """Return the bucket of each time, as `bucket_of` does.
 
-    A bucket is the exponent and the first bits of the mantissa of a floating-point number. Both are
-    read from the bits of that number. If a time is too long for an exact conversion, its low bits
-    are cleared first, so that it is not rounded up.
+    A bucket is the exponent and the first bits of the mantissa of a floating-point number. Both
+    values are read from the bits of that number. If a time is too long for an exact conversion, its
+    low bits are cleared first, so that the time is not rounded up.
     """
     exact = np.where(times_us >> _MANTISSA_BITS, times_us & _COARSE, times_us)
     bits = exact.astype(np.float64).view(np.int64) >> _MANTISSA_BITS - SUB_BITS
@@ -251,18 +256,18 @@ _Payloads = npt.NDArray[np.uint64]
 
 _BYTES: Final = 8
 _ADDED: Final = 255
-"""So many bits are added up in a byte."""
+"""Number of bits that can be added up in a byte."""
 
 _SPREAD: Final = (
     np.unpackbits(np.arange(256, dtype=np.uint8)[:, np.newaxis], axis=1, bitorder="little")
     .view("<u8")[:, 0]
     .astype(np.uint64)
 )
-"""The bits of each byte, a byte of a word each."""
+"""The bits of each byte value, with one bit in each byte of a word."""
 
 
 class _ColumnChanges:
-    """Counts the changes of each bit of each identifier of a bus.
+    """Counter of the changes of each payload bit of each identifier of a bus.
 
     A payload that is shorter than the previous one is padded with zeros.
 
@@ -275,7 +280,7 @@ class _ColumnChanges:
         self._counts = np.empty((0, traffic.PAYLOAD_BITS), np.int64)
 
     def take(self, runs: Runs, payload: _Payloads, count: int) -> None:
-        """Compare the payloads of a block; there are `count` identifiers now."""
+        """Compare the payloads of a block. `count` is the current number of identifiers."""
         self.payload, self._latest = grown(self.payload, count), grown(self._latest, count)
         self._counts = grown(self._counts, count)
         ordered = payload[runs.order]
@@ -287,12 +292,12 @@ class _ColumnChanges:
         self._add(runs, changes)
 
     def rows(self) -> list[traffic.BitRow]:
-        """Return what changed in each identifier."""
+        """Return the changed bits of each identifier."""
         planes, latest = _planes(self._counts), self._latest.tolist()
         return [traffic.BitRow(*row) for row in zip(latest, planes, strict=True)]
 
     def _add(self, runs: Runs, changes: _Payloads) -> None:
-        """Add up each byte's bits side by side: as many rows at once as a byte can count."""
+        """Add up the bits of each byte side by side, for as many rows as a byte can count."""
         begins, pieces = _pieces(runs)
         octets = changes.astype("<u8").view(np.uint8).reshape(-1, _BYTES)
         for place in range(_BYTES):
@@ -305,7 +310,7 @@ class _ColumnChanges:
 
 
 def _pieces(runs: Runs) -> tuple[Ints, Ints]:
-    """Cut runs; return where each piece begins, and the first piece of each run."""
+    """Split runs into pieces. Return the begin of each piece, and the first piece of each run."""
     counts = -(-runs.lengths // _ADDED)
     firsts = np.cumsum(counts) - counts
     nth = np.arange(int(counts.sum())) - np.repeat(firsts, counts)
@@ -327,7 +332,7 @@ def _planes(counts: Ints) -> list[tuple[int, ...]]:
 
 
 class ColumnTraffic:
-    """Counts all frames of all buses; what it keeps grows with identifiers, not with frames."""
+    """Counter of all frames of all buses. Its memory grows with identifiers, not with frames."""
 
     def __init__(self) -> None:
         self._buses: dict[str, _ColumnBus] = {}
@@ -351,11 +356,11 @@ class ColumnTraffic:
 
 
 class _ColumnBus:
-    """Counts one bus.
+    """Counter of one bus.
 
     Args:
-        channel: its name.
-        first_us: when the first frame came, or error frame.
+        channel: name of the bus.
+        first_us: time of the first frame or error frame.
     """
 
     def __init__(self, channel: str, first_us: int) -> None:
@@ -366,7 +371,7 @@ class _ColumnBus:
         self._bits, self._dlc = np.empty(0, np.int64), np.empty(0, np.uint8)
 
     def take(self, frames: Columns) -> None:
-        """Count frames, one at least."""
+        """Count frames. There is at least one frame."""
         self._went_back += int(np.count_nonzero(np.diff(frames.at_us, prepend=self._last_us) < 0))
         self._last_us = int(frames.at_us[-1])
         errors, frames = split_errors(frames)
@@ -389,7 +394,7 @@ class _ColumnBus:
         self._dlc[runs.numbers] = frames.dlc[runs.order[runs.ends - 1]]
 
     def row(self, now_us: int) -> traffic.BusRow:
-        """Return what the bus did."""
+        """Return the statistics of the bus."""
         return traffic.BusRow(
             self._channel,
             self._frames,
@@ -401,7 +406,7 @@ class _ColumnBus:
         )
 
     def id_rows(self) -> list[traffic.IdRow]:
-        """Return what its identifiers did, in their order."""
+        """Return the statistics of the identifiers in their order."""
         values = zip(
             self._idents.idents.tolist(),
             self._idents.first_us.tolist(),

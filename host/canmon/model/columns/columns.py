@@ -1,8 +1,8 @@
-"""A log as columns of numpy: an array for each property of a frame.
+"""A log as columns of numpy, with an array for each property of a frame.
 
-numpy comes with the extra `fast`; this module is imported only if numpy is installed.
+numpy comes with the extra `fast`. This module is imported only if numpy is installed.
 
-The frames of a bus by identifier, block after block; needs numpy.
+The module also groups the frames of a bus by identifier, block after block.
 
 >>> idents = Identifiers()
 >>> runs = idents.take(np.array([0x181, 0x080, 0x181]), np.array([100, 200, 500]))
@@ -32,18 +32,18 @@ Ints = npt.NDArray[np.int64]
 
 
 class NoColumnsError(ValueError):
-    """A log that is no columns, for it holds CAN FD: it is to be read frame by frame."""
+    """A log that cannot be columns because it contains CAN FD. It must be read frame by frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Frames, column by column, in the order of the log.
+    """Frames as columns, in the order of the log.
 
     Attributes:
-        at_us: end of each frame, in microseconds.
-        ident: identifier; bit 31 extended, bit 30 remote, bit 29 error frame.
-        dlc: data length code, 0 to 8.
-        payload: data as a little-endian number, padded with zeros.
+        at_us: end of each frame in microseconds.
+        ident: identifier of each frame. Bit 31 is extended, bit 30 remote, bit 29 error frame.
+        dlc: data length code of each frame, 0 to 8.
+        payload: data of each frame as a little-endian number, padded with zeros.
         sent: whether the recorder sent the frame.
         channel: index of the bus in `channels`.
         channels: names of the buses, in the order in which they appeared.
@@ -63,7 +63,7 @@ class Columns:
         return self.at_us, self.ident, self.dlc, self.payload, self.sent, self.channel
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
         return len(self.at_us)
 
 
@@ -75,11 +75,11 @@ class ChannelNames:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names."""
+        """The names in the order of appearance."""
         return tuple(self._places)
 
     def place(self, name: str) -> int:
-        """Return the place of a name; LogError if there are too many."""
+        """Return the index of a name. Raise LogError if there are too many names."""
         place = self._places.setdefault(name, len(self._places))
         if place >= _MOST_CHANNELS:
             raise LogError(f"more than {_MOST_CHANNELS} buses in a log")
@@ -87,7 +87,7 @@ class ChannelNames:
 
 
 class Rows:
-    """Columns in which some frames are not known yet.
+    """Columns in which some frames are still unknown.
 
     Attributes:
         at_us, ident, dlc, payload, sent, channel: as in `Columns`; 0 in unknown rows.
@@ -113,7 +113,7 @@ class Rows:
 
     @classmethod
     def joined(cls, pieces: Sequence[Rows]) -> Rows:
-        """Return the rows of several pieces, one at least."""
+        """Return the rows of several pieces. There is at least one piece."""
         if len(pieces) == 1:
             return pieces[0]
         rows = cls(sum(len(piece.known) for piece in pieces))
@@ -122,7 +122,7 @@ class Rows:
         return rows
 
     def put(self, row: int, record: Record, channel: int) -> None:
-        """Write one row; NoColumnsError where a frame of CAN FD does not fit into it."""
+        """Write one row. Raise NoColumnsError if a CAN FD frame does not fit into the row."""
         frame = record.frame
         if isinstance(frame, FdFrame):
             raise NoColumnsError("CAN FD")
@@ -133,7 +133,7 @@ class Rows:
         self.channel[row], self.known[row] = channel, True
 
     def columns(self, channels: ChannelNames) -> Columns:
-        """Return the rows that are known as columns."""
+        """Return the known rows as columns."""
         parts = self.at_us, self.ident, self.dlc, self.payload, self.sent, self.channel
         columns = Columns(*parts, channels.names)
         return columns if self.known.all() else select(columns, np.flatnonzero(self.known))
@@ -146,7 +146,7 @@ def select(columns: Columns, rows: Ints | slice) -> Columns:
 
 
 def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
-    """Return each bus that has any frames, in the order of the names, its rows and its frames."""
+    """Return each bus that has frames, in the order of the names, with its rows and its frames."""
     present = np.flatnonzero(np.bincount(columns.channel)).tolist()
     if len(present) == 1:
         return [(columns.channels[present[0]], np.arange(len(columns)), columns)]
@@ -155,7 +155,7 @@ def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
 
 
 def split_errors(columns: Columns) -> tuple[Columns, Columns]:
-    """Return the error frames, and the others."""
+    """Return the error frames, and the other frames."""
     errors = columns.ident & ERROR != 0
     if not errors.any():
         return select(columns, np.empty(0, np.int64)), columns
@@ -163,7 +163,7 @@ def split_errors(columns: Columns) -> tuple[Columns, Columns]:
 
 
 def records(columns: Columns) -> list[Record]:
-    """Return frames as a reader of single frames gives them."""
+    """Return frames as records, as a reader of single frames returns them."""
     names = columns.channels
     rows = zip(*(part.tolist() for part in columns.parts), strict=True)
     return [
@@ -191,22 +191,23 @@ def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
 Numbers = TypeVar("Numbers", bound=npt.NDArray[Any])
 
 _RADIX: Final = 1 << 16
-"""numpy sorts 16 bits three times as fast as 32."""
+"""Size of a digit for sorting. numpy sorts 16 bits three times as fast as 32."""
 
 _NO_IDENT: Final = 0xFFFF_FFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Rows sorted by identifier; the rows of one identifier keep their order, and form a run.
+    """Rows sorted by identifier. The rows of an identifier keep their order, and form a run.
 
     Attributes:
-        order: the rows.
+        order: rows in the sorted order.
         begins: start of each run in `order`.
-        ends: end of each run in `order`, one after its last row.
+        ends: end of each run in `order`, which is the index after its last row.
         numbers: number of each run's identifier.
         fresh: whether a run begins with the first frame of its identifier.
-        gaps_us: the gap before each row of `order`; 0 before a first frame, and if time goes back.
+        gaps_us: gap before each row of `order`. It is 0 before a first frame, and if time goes
+            back.
     """
 
     order: Ints
@@ -218,19 +219,19 @@ class Runs:
 
     @property
     def lengths(self) -> Ints:
-        """How many frames each run has."""
+        """The number of frames of each run."""
         return self.ends - self.begins
 
     def sums(self, values: Ints) -> Ints:
-        """Add up values, in the order of `order`, run by run."""
+        """Return the sum of values of each run. The values are in the order of `order`."""
         return np.add.reduceat(values, self.begins)
 
 
 class Identifiers:
-    """Numbers the identifiers of a bus as they appear, and sorts blocks of frames by them.
+    """Numbers of the identifiers of a bus by first appearance, used to sort blocks of frames.
 
     Attributes:
-        idents: the identifiers, by number.
+        idents: identifiers by number.
         first_us: time of the first frame of each identifier.
         last_us: time of the last frame of each identifier.
     """
@@ -241,11 +242,11 @@ class Identifiers:
         self._numbers = np.array([-1])
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of identifiers."""
         return len(self.idents)
 
     def take(self, ident: npt.NDArray[np.uint32], at_us: Ints) -> Runs:
-        """Sort a block of frames, one at least."""
+        """Sort a block of frames. There is at least one frame."""
         before = len(self)
         numbers = self._numbered(ident)
         order = np.argsort(
@@ -263,7 +264,7 @@ class Identifiers:
         return Runs(order, begins, ends, numbers, fresh, np.maximum(gaps_us, 0, out=gaps_us))
 
     def _numbered(self, ident: npt.NDArray[np.uint32]) -> Ints:
-        """Return the number of each row's identifier; new ones get the next numbers."""
+        """Return the number of each row's identifier. New identifiers get the next numbers."""
         places = np.searchsorted(self._sorted, ident)
         strange = self._sorted[places] != ident
         if strange.any():
@@ -283,7 +284,7 @@ class Identifiers:
 
 
 def grown(column: Numbers, count: int) -> Numbers:
-    """Return a column with this many rows; new rows are 0."""
+    """Return a column with this many rows. New rows are 0."""
     if len(column) == count:
         return column
     rows = np.zeros((count, *column.shape[1:]), column.dtype)
@@ -295,7 +296,7 @@ def grown(column: Numbers, count: int) -> Numbers:
 
 
 class ColumnLoad:
-    """Adds up the bits of each second, counted from the first frame.
+    """Sum of the bits of each second, counted from the first frame.
 
     Args:
         first_us: time of the first frame.
@@ -308,7 +309,7 @@ class ColumnLoad:
         self._first_us, self.load = first_us, Load(first_us)
 
     def take(self, at_us: Ints, bits: Ints) -> list[tuple[BusSecond, int]]:
-        """Count frames; return the seconds that are over, each with the row that ended it."""
+        """Count frames. Return the completed seconds, each with the row that ended it."""
         if not len(at_us):
             return []
         opened = (self.load.end().at_us - self._first_us) // WINDOW_US

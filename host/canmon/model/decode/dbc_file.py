@@ -1,4 +1,4 @@
-"""Signals by a DBC file, through cantools."""
+"""Signals of a DBC file, decoded by cantools."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 class DbcError(ValueError):
-    """A file that is no DBC, or cantools is not there."""
+    """A file that is not a DBC file, or cantools is not installed."""
 
 
 class DbcFile:
-    """Decodes the CAN-IDs that a DBC file names; for these it has precedence over all others.
+    """Decoder of the CAN-IDs in a DBC file, which takes precedence over all other decoders.
 
     Args:
-        path: the file, in UTF-8, or otherwise in Windows-1252.
+        path: path of the file, in UTF-8, or otherwise in Windows-1252.
 
     Raises:
         OSError: the file cannot be read.
-        DbcError: it is malformed, or the extra `dbc` is not installed.
+        DbcError: the file is malformed, or the extra `dbc` is not installed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -62,11 +62,11 @@ class DbcFile:
         return (can_id, extended) in self._messages
 
     def message(self, can_id: int, extended: bool) -> Message:
-        """Return what the file says of a CAN-ID that it names."""
+        """Return the message that the file defines for a CAN-ID."""
         return self._messages[can_id, extended]
 
     def decode(self, record: Record) -> Decoded | None:
-        """Return the signals of a frame; None where the file does not name its CAN-ID."""
+        """Return the signals of a frame, or None if the file does not name its CAN-ID."""
         frame = record.frame
         if isinstance(frame, ErrorFrame):
             return None
@@ -99,7 +99,7 @@ class DbcFile:
         """Return the signals of a frame that cantools does not decode, and the names of the rest.
 
         cantools returns no signal if a multiplexer has a value without signals, or if a signal
-        overlaps another one or exceeds the message. In these cases each signal is decoded by
+        overlaps another signal or exceeds the message. In these cases, each signal is decoded by
         itself. Signals without a multiplexer are returned, and signals that the value of their
         multiplexer selects. The rest are selected signals that cannot be decoded.
         """
@@ -135,7 +135,7 @@ def _text(data: bytes) -> str:
 
 
 def _alone(message: Message, signal: SignalOfDbc) -> Message:
-    """Return the message with one signal of it, that nothing selects."""
+    """Return the message with only one of its signals, which no multiplexer selects."""
     from cantools.database.can import Message as NewMessage  # noqa: PLC0415 - slow, and an extra
 
     one = copy(signal)
@@ -151,7 +151,7 @@ def _alone(message: Message, signal: SignalOfDbc) -> Message:
 
 
 def signal_of(name: str, value: Value | NamedSignalValue, unit: str) -> Signal:
-    """Return a signal; an enumerated one has its name as text."""
+    """Return a signal. An enumerated signal has its name as text."""
     if isinstance(value, bool | int | float | str | bytes):
         return Signal(name, value, unit)
     return Signal(name, value.value, unit, value.name)

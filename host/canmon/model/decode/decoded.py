@@ -1,4 +1,4 @@
-"""What a frame says, once it is decoded, and an SDO transfer as one value."""
+"""The meaning of a decoded frame, and an SDO transfer as one value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tickrig.wire.canopen.sdo_frame import describe_abort
 
 
 class TransferDirection(StrEnum):
-    """Which way the value goes, in the words of CiA 301."""
+    """Direction of the value, in the words of CiA 301."""
 
     UPLOAD = "upload"
     DOWNLOAD = "download"
@@ -21,7 +21,7 @@ class TransferDirection(StrEnum):
 
 
 class TransferMode(StrEnum):
-    """How the bytes are carried."""
+    """Mode in which the bytes are transferred."""
 
     EXPEDITED = "expedited"
     SEGMENTED = "segmented"
@@ -29,7 +29,7 @@ class TransferMode(StrEnum):
 
 
 class TransferOutcome(StrEnum):
-    """How a transfer ended, as far as the bus shows it."""
+    """Outcome of a transfer, as far as the bus shows it."""
 
     DONE = "done"
     ABORTED = "aborted"
@@ -47,24 +47,25 @@ class Transfer:
     """One SDO transfer.
 
     Attributes:
-        at_us: time of its first frame.
-        duration_us: time from its first to its last frame.
-        node: the server.
-        direction: an upload reads, a download writes.
+        at_us: time of the first frame.
+        duration_us: time from the first to the last frame.
+        node: node-ID of the server.
+        direction: direction of the value. An upload reads, a download writes.
         mode: transfer mode.
-        index: None if the beginning is missing.
-        sub: None if the beginning is missing.
-        outcome: how it ended.
-        data: the bytes; None if they are missing.
-        abort_code: the reason if it was aborted.
-        by_client: whether the client aborted it.
+        index: index of the object, or None if the beginning is missing.
+        sub: sub-index of the object, or None if the beginning is missing.
+        outcome: outcome of the transfer.
+        data: bytes of the value, or None if they are missing.
+        abort_code: reason of an aborted transfer.
+        by_client: whether the client aborted the transfer.
         retries: number of repeated frames and segments.
-        partial: whether its beginning is missing.
-        flaws: inconsistencies: a gap, a size, a CRC.
-        sized: whether the number of bytes is indicated; an expedited transfer without it has four.
+        partial: whether the beginning of the transfer is missing.
+        flaws: inconsistencies such as a gap, a size or a CRC.
+        sized: whether the number of bytes is indicated. An expedited transfer without it has four
+            bytes.
         length: text about an unusual length; empty if the length is usual.
-        name: of the object, empty if unknown.
-        value: value of the bytes; for an unknown type, up to 8 bytes are a number.
+        name: name of the object, empty if unknown.
+        value: value of the bytes. For an unknown type, up to 8 bytes are a number.
         text: the value as text.
         unit: unit of the value.
         source: source of name and type.
@@ -94,11 +95,11 @@ class Transfer:
 
     @property
     def entry(self) -> tuple[int, int] | None:
-        """Index and sub-index; None if they are unknown."""
+        """Index and sub-index, or None if they are unknown."""
         return None if self.index is None or self.sub is None else (self.index, self.sub)
 
     def __str__(self) -> str:
-        """Write one line."""
+        """Return the transfer as one line."""
         parts = [f"{self.direction} {write_entry(self.entry)}"]
         parts += [self.name] if self.name else []
         parts += [f"= {self.text}{self.unit}"] if self.text else []
@@ -124,7 +125,7 @@ class Transfer:
 
 
 def write_entry(entry: tuple[int, int] | None) -> str:
-    """Write index and sub-index.
+    """Return index and sub-index as text.
 
     >>> write_entry((0x6041, 0)), write_entry(None)
     ('6041h:00', 'an unknown object')
@@ -137,17 +138,17 @@ def write_entry(entry: tuple[int, int] | None) -> str:
 EDS: Final = "eds"
 SEEN: Final = "seen"
 DBC: Final = "dbc"
-"""Where names and mappings come from: a file, SDO traffic, a DBC file; else the standard."""
+"""Source of names and mappings: an EDS file, SDO traffic, or a DBC file. Empty is the standard."""
 
 
 class Signal(NamedTuple):
     """A value of a frame.
 
     Attributes:
-        name: name of an object in lower case, with a dot before the member of a record. For an
-            object without a name, index and sub-index, such as `6041h:00`. For a DBC file, the name
-            in that file.
-        value: the value.
+        name: name of an object in lower case, with a dot before the member of a record. An object
+            without a name has index and sub-index, such as `6041h:00`. For a DBC file, it is the
+            name in that file.
+        value: value of the signal.
         unit: unit in the EDS or DBC file, otherwise empty.
         text: the value as text, if it differs from the value.
     """
@@ -158,7 +159,7 @@ class Signal(NamedTuple):
     text: str = ""
 
     def __str__(self) -> str:
-        """Write name and value."""
+        """Return name and value as text."""
         return f"{self.name}={self.text or str(self.value)}{self.unit}"
 
 
@@ -166,19 +167,20 @@ class Decoded(NamedTuple):
     """A decoded frame, for display and filters.
 
     Attributes:
-        kind: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1.., rpdo1.., lss, dbc,
-            error, rrc, rtc-lite; unmapped for a PDO without a description, fd for a CAN FD frame,
-            raw for all others.
-        node: the node of the object; None if there is none.
-        summary: one line of text; None if transfers or signals contain everything.
-        signals: the values in the frame.
-        source: `EDS`, `SEEN`, `DBC`; empty if the standard alone defines it.
-        entry: index and sub-index that an SDO frame is about.
-        transfers: the SDO transfers that ended with this frame.
-        asks: whether its sender waits for an answer, as an SDO client does, or an NMT master with
-            node guarding.
-        size: number of bytes of a PDO according to its mapping; None if unknown.
-        flaw: an inconsistency that an SDO frame adds to its transfer.
+        kind: kind of the frame: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1..,
+            rpdo1.., lss, dbc, error, rrc, rtc-lite; unmapped for a PDO without a description, fd
+            for a CAN FD frame, raw for all others.
+        node: node of the object, or None if there is none.
+        summary: one line of text, or None if transfers or signals contain all information.
+        signals: values in the frame.
+        source: source of names, which is `EDS`, `SEEN` or `DBC`, or empty if the standard alone
+            defines the frame.
+        entry: index and sub-index of the object in an SDO frame.
+        transfers: SDO transfers that ended with this frame.
+        asks: whether the sender of the frame waits for an answer, as an SDO client does, or an NMT
+            master with node guarding.
+        size: number of bytes of a PDO according to its mapping, or None if unknown.
+        flaw: inconsistency that an SDO frame adds to its transfer.
     """
 
     kind: str
@@ -194,7 +196,7 @@ class Decoded(NamedTuple):
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """The decoded frame as one line of text."""
         if self.summary is not None:
             return self.summary
         return "; ".join(map(str, self.transfers)) or " ".join(map(str, self.signals))

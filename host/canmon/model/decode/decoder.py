@@ -85,7 +85,7 @@ if TYPE_CHECKING:
 # (tests/test_start_up.py).
 
 Route = Callable[[int, CanFrame], Decoded]
-"""Decodes the frames of a CAN-ID, each with its time."""
+"""Function that decodes the frames of a CAN-ID, each with its time."""
 
 _SYNC_ID: Final = 0x080
 _TIME_ID: Final = 0x100
@@ -104,30 +104,30 @@ _PRE_DEFINED: Final[dict[int, Route]] = {
 
 
 class Effect(IntEnum):
-    """Which frames with a CAN-ID can change what is known of nodes."""
+    """The frames of a CAN-ID that can change the knowledge about nodes."""
 
     NONE = 0
     LATEST = 1
-    """The latest of each length, until one of `EACH` comes or a boot-up: a TPDO."""
+    """The latest frame of each length, until a frame of `EACH` or a boot-up comes: a TPDO."""
     ALONE = 2
-    """Each, but it changes nothing that a PDO does, unless it is a boot-up: error control, EMCY."""
+    """Each frame, but without effect on PDOs, except for boot-ups: error control, EMCY."""
     EACH = 3
 
 
 class BusDecoder:
-    """Decodes the frames of one bus, in the order of their arrival.
+    """Decoder of the frames of one bus, in the order of their arrival.
 
     The pre-defined connection set defines the CAN-IDs until an EDS or SDO traffic changes them
     (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
 
     Args:
-        eds: contents of EDS files, by node-ID.
-        files: where to search for files of other nodes; None for no search.
+        eds: content of EDS files by node-ID.
+        files: source of files for other nodes, or None for no search.
         channel: name of the bus for that search.
 
     Attributes:
         changes: number of possible changes of the meaning of a CAN-ID.
-        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set got another meaning.
+        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set has got another meaning.
     """
 
     def __init__(
@@ -172,10 +172,10 @@ class BusDecoder:
         return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
 
     def lasting(self, can_id: int) -> Route | None:
-        """Return a decoder of a CAN-ID that needs no earlier frames; None if earlier frames count.
+        """Return a decoder of a CAN-ID that needs no earlier frames, or None if it needs them.
 
-        It is valid until `changes` grows. For error control, SDO and multiplexed PDOs, earlier
-        frames count.
+        The decoder is valid until `changes` grows. For error control, SDO and multiplexed PDOs,
+        earlier frames count.
         """
         route = self._routes.get(can_id) or self._route(can_id)
         told = route.func if isinstance(route, partial) else route
@@ -191,9 +191,10 @@ class BusDecoder:
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
     def heartbeat(self, can_id: int) -> Route | None:
-        """Return a decoder of heartbeats of a node without node guarding; None for other CAN-IDs.
+        """Return a decoder of heartbeats of a node without node guarding, or None.
 
-        It is valid until a remote frame arrives. Pass a boot-up to `take`, because it changes more.
+        The decoder is valid until a remote frame arrives. Pass a boot-up to `take`, because a
+        boot-up changes more.
         """
         route = self._routes.get(can_id) or self._route(can_id)
         if not isinstance(route, partial) or route.func != self._error_control:
@@ -202,12 +203,12 @@ class BusDecoder:
         return None if node in self._guarded else partial(_unguarded, node)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
-        """Return the SDO transfers that run."""
+        """Return the running SDO transfers."""
         found = (channel.pending(now_us) for channel in self._channels.values())
         return tuple(self._named(transfer) for transfer in found if transfer)
 
     def memory(self, node: int) -> node_memory.NodeMemory:
-        """Return what is known of a node."""
+        """Return the knowledge about a node."""
         memory = self._memories.get(node)
         if memory is None:
             memory = self._memories[node] = node_memory.NodeMemory(self._eds.get(node))
@@ -226,7 +227,7 @@ class BusDecoder:
         return self._node_route(node, can_id) if node else _raw
 
     def _node_route(self, node: int, can_id: int) -> Route:
-        """Return what the pre-defined connection set says of a CAN-ID with a node-ID in it."""
+        """Return the meaning that the pre-defined connection set gives a CAN-ID with a node-ID."""
         match can_id - node:
             case 0x080:
                 return partial(_emcy, node)
@@ -279,7 +280,7 @@ class BusDecoder:
         return said._replace(flaw=step.flaw) if step.flaw else said
 
     def _named(self, transfer: Transfer) -> Transfer:
-        """Return it with name and value of its object."""
+        """Return a transfer with name and value of its object."""
         entry = transfer.entry
         text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
         data, sized = transfer.data, transfer.sized
@@ -289,7 +290,7 @@ class BusDecoder:
         return replace(named, length=length, unit=text.unit, source=text.source)
 
     def _learn(self, transfer: Transfer) -> None:
-        """Take a transferred value as evidence."""
+        """Learn from a transferred value."""
         memory = self.memory(transfer.node)
         was_drive, entry = memory.is_drive, transfer.entry
         if not memory.learn(transfer) or entry is None:
@@ -303,7 +304,7 @@ class BusDecoder:
             self._find_eds(self._files, transfer.node)
 
     def _find_eds(self, files: EdsFiles, node: int) -> None:
-        """Look for the file of a node by what it has said of 1018h."""
+        """Search the file of a node by the values of 1018h that the node has sent."""
         memory = self.memory(node)
         entries = ((_IDENTITY, sub) for sub in (1, 2, 3))
         identity = node_identity(
@@ -318,14 +319,14 @@ class BusDecoder:
             self._learn_cob_ids(node, index)
 
     def _refresh(self, pdos: Iterable[NodePdo]) -> None:
-        """Read again what is known of some PDOs."""
+        """Update the layout of some PDOs."""
         for pdo in pdos:
             self.changes += 1
             for can_id in self._pdos.update(pdo, self.memory(pdo.node)):
                 self._forget(can_id)
 
     def _learn_cob_ids(self, node: int, index: int) -> None:
-        """Learn a CAN-ID that is not that of the pre-defined connection set."""
+        """Learn a CAN-ID that differs from the pre-defined connection set."""
         if index in _SDO_SERVERS:
             request, response = (self._configured_id(node, index, sub) for sub in (1, 2))
             if request is not None and response is not None:
@@ -361,7 +362,7 @@ class BusDecoder:
 
 
 def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:
-    """Report that a number of bytes was not indicated, or is not that of the type."""
+    """Report a number of bytes that was not indicated, or that does not fit the data type."""
     if not sized:
         return "" if kind is not None and kind.size == len(data) else "size not indicated"
     if kind is None or not kind.size or kind.size == len(data):
@@ -404,34 +405,34 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 
 
 def decodes_all_alike(route: Route) -> bool:
-    """Return whether a route decodes all data the same way."""
+    """Return whether a route decodes all data in the same way."""
     return (route.func if isinstance(route, partial) else route) in (_unmapped, _raw)
 
 
 FD: Final = Decoded("fd", None, "no CANopen service")
-"""CANopen is spoken in classic frames (CiA 301, 5.3); CANopen FD is another protocol."""
+"""Meaning of a CAN FD frame. CANopen uses classic frames (CiA 301, 5.3). CANopen FD differs."""
 
 _NO_EDS: Final[Mapping[int, Path | node_memory.EdsObjects]] = MappingProxyType({})
 
 
 class FrameDecoder(Protocol):
-    """Decodes frames that neither the standard nor a DBC file describes."""
+    """Decoder of frames that neither the standard nor a DBC file describes."""
 
     def decode(self, record: Record) -> Decoded | None:
-        """Return what a frame says; None for a frame of others."""
+        """Return the meaning of a frame, or None for a frame of another protocol."""
 
 
 class Decoder:
-    """Decodes frames, in order; each bus has its own nodes.
+    """Decoder of frames in order. Each bus has its own nodes.
 
     Args:
-        eds: an EDS or DCF, or its content, by node-ID; valid on every bus. `EdsFiles` with a folder
-            also has files of other nodes, chosen by the identity in the traffic.
-        dbc: DBC files; they take precedence for their CAN-IDs.
+        eds: path or content of an EDS or DCF by node-ID, valid on every bus. `EdsFiles` with a
+            folder also has files of other nodes, chosen by the identity in the traffic.
+        dbc: DBC files, which take precedence for their CAN-IDs.
         first: decoders that are tried before all others.
 
     Attributes:
-        first: these decoders, followed by the DBC files.
+        first: decoders that are tried first, followed by the DBC files.
 
     Raises:
         OSError: a file cannot be read.
@@ -459,7 +460,7 @@ class Decoder:
         return not self.first
 
     def take(self, record: Record) -> Decoded:
-        """Decode a frame, and learn from it."""
+        """Decode a frame, and learn from the frame."""
         frame = record.frame
         if isinstance(frame, ErrorFrame):
             return decode_error(frame)
@@ -477,15 +478,15 @@ class Decoder:
         return bus.take(record.at_us, frame)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
-        """Return the SDO transfers that run, as they would end now."""
+        """Return the running SDO transfers, as if they ended now."""
         return tuple(item for bus in self._buses.values() for item in bus.pending(now_us))
 
     def memory(self, channel: str, node: int) -> node_memory.NodeMemory:
-        """Return what is known of a node."""
+        """Return the knowledge about a node."""
         return self.bus(channel).memory(node)
 
     def bus(self, channel: str) -> BusDecoder:
-        """Return what decodes a bus."""
+        """Return the decoder of a bus."""
         bus = self._buses.get(channel)
         if bus is None:
             bus = self._buses[channel] = BusDecoder(self._eds, self._files, channel)

@@ -42,16 +42,16 @@ _SECTIONS: Final = re.compile(
 )
 _KEYS: Final = ("VendorNumber", "ProductNumber", "RevisionNumber")
 _MAJOR: Final = 16
-"""Bits of the revision below its major half."""
+"""Number of bits of the revision number below its major half."""
 
 
 class EdsIdentity(NamedTuple):
     """Vendor, product and revision of a device (1018h).
 
     Attributes:
-        vendor: 1018h:01.
-        product: 1018h:02.
-        revision: 1018h:03; None if unknown.
+        vendor: vendor-ID (object 1018h:01).
+        product: product code (object 1018h:02).
+        revision: revision number (object 1018h:03), or None if unknown.
     """
 
     vendor: int
@@ -64,24 +64,24 @@ class EdsIdentity(NamedTuple):
 
 
 def node_identity(values: Sequence[int | None]) -> EdsIdentity | None:
-    """Return the identity of 1018h:01 to 03; None if vendor or product is not known."""
+    """Return the identity from 1018h:01 to 03, or None if vendor or product is unknown."""
     vendor, product, revision = values
     return None if vendor is None or product is None else EdsIdentity(vendor, product, revision)
 
 
 class _EdsChoice(NamedTuple):
-    """The file for a node.
+    """The chosen file of a node.
 
     Attributes:
-        path: the file.
-        text: for people: which it is, why, and which others fit.
+        path: path of the file.
+        text: text for the user that contains the chosen file, the reason, and other files that fit.
     """
 
     path: Path
     text: str
 
     def said(self, node: int) -> str:
-        """Return the line for people."""
+        """Return the line for the user."""
         return f"node {node}: EDS {self.text}"
 
 
@@ -91,7 +91,7 @@ class _Candidate(NamedTuple):
     node: int | None  # of a DCF
 
     def rank(self, wanted: EdsIdentity, node: int) -> tuple[int, int, int, str]:
-        """Return how well it fits a node; less is better."""
+        """Return how well a file fits a node. A smaller rank is better."""
         revision, asked = self.identity.revision, wanted.revision
         kind = 1 if self.node is None else 0 if self.node == node else 2
         if revision is None or asked is None:
@@ -109,10 +109,10 @@ _REVISIONS: Final = {
 
 
 class EdsFolder:
-    """The files of some folders.
+    """The EDS files of some folders.
 
     Args:
-        folders: they are there, and are folders.
+        folders: paths of existing folders.
     """
 
     def __init__(self, folders: Sequence[Path]) -> None:
@@ -120,7 +120,7 @@ class EdsFolder:
         self._candidates: list[_Candidate] | None = None
 
     def choose(self, node: int, wanted: EdsIdentity) -> _EdsChoice | None:
-        """Return the file for a node; None if none fits."""
+        """Return the file for a node, or None if no file fits."""
         if self._candidates is None:
             self._candidates = list(self._read())
         fitting = sorted(
@@ -155,7 +155,7 @@ class EdsFolder:
 
 
 def _reason(best: _Candidate, other: _Candidate, wanted: EdsIdentity, node: int) -> str:
-    """Return why one fits better than the next."""
+    """Return why a file fits better than the next one."""
     first, second = best.rank(wanted, node), other.rank(wanted, node)
     if first[0] != second[0]:
         return _REVISIONS[first[0]]
@@ -167,7 +167,7 @@ def _reason(best: _Candidate, other: _Candidate, wanted: EdsIdentity, node: int)
 
 
 def _candidate(path: Path) -> _Candidate | None:
-    """Return whom a file is for; None if it does not say so."""
+    """Return the identity that a file is for, or None if the file contains none."""
     text = decode_text(read_eds_bytes(path))
     if path.suffix.lower() in _ENDINGS[:2]:
         text = "\n".join(match[0] for match in _SECTIONS.finditer(text))
@@ -185,17 +185,17 @@ def _candidate(path: Path) -> _Candidate | None:
 
 
 class EdsFiles(dict[int, EdsObjects]):
-    """Contents of EDS files, by node-ID; files of other nodes are chosen from a folder.
+    """Content of EDS files by node-ID. The files of other nodes are chosen from a folder.
 
-    A chosen file is added, so that the names in it are known from then on.
+    A chosen file is added, so that the names in the file are known from then on.
 
     Args:
-        given: files of given nodes; the folder is not searched for these nodes.
-        folder: folder with files of other nodes; None for no folder.
-        notify: called with a line of text about each choice.
+        given: files of given nodes. The folder is not searched for these nodes.
+        folder: folder with files of other nodes, or None for no folder.
+        notify: function that is called with a line of text about each choice.
 
     Attributes:
-        folder: as given.
+        folder: folder with files of other nodes, or None for no folder.
     """
 
     def __init__(
@@ -212,12 +212,12 @@ class EdsFiles(dict[int, EdsObjects]):
     def find(self, channel: str, node: int, identity: EdsIdentity) -> EdsObjects | None:
         """Return the content of the file that fits a node.
 
-        It returns None if no file fits, or if the file for the node is already chosen.
+        The result is None if no file fits, or if the file for the node is already chosen.
 
         Args:
-            channel: the bus.
-            node: the node.
-            identity: the identity that the node reports.
+            channel: name of the bus.
+            node: node-ID of the node.
+            identity: identity that the node reports.
         """
         if self.folder is None or node in self._given:
             return None
