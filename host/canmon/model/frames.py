@@ -1,12 +1,12 @@
 """The input of a monitor: frames and lines of serial ports, with their identifiers and text.
 
-An identifier is one number: the CAN-ID with flags above it. candump's filters apply to it.
+An identifier is one number. It is the CAN-ID with flags above it. candump's filters apply to it.
 
 >>> chosen = CandumpFilter.parse("123:7FF,400~700,#FF")
 >>> [chosen.passes(ident) for ident in (0x123, 0x400, 0x501, ERROR_FLAG | 0x20, ERROR_FLAG | 0x100)]
 [True, False, True, True, False]
 
-Frames as lines of text, as candump shows them.
+The module also writes frames as lines of text, as candump does.
 
 >>> lines = DumpLines(Stamp.ZERO)
 >>> lines.line(Record(1_000_000, "can0", CanFrame.parse("705#7F")))
@@ -40,20 +40,20 @@ if TYPE_CHECKING:
 # What a monitor takes in: frames and lines of serial ports, with when and where.
 
 ARROWS: Final = {True: ">", False: "<"}
-"""How a line is shown that is sent to the device, and one from it."""
+"""Signs for the direction of a line, sent to the device or received from it."""
 
 
 AnyFrame = CanFrame | ErrorFrame | FdFrame
 
 
 class Record(NamedTuple):
-    """One frame, CAN FD frame or error frame, as it was on the bus.
+    """One frame, CAN FD frame or error frame on the bus.
 
     Attributes:
-        at_us: end of the frame in microseconds; since the epoch in logs and on real buses.
+        at_us: end of the frame in microseconds, since the epoch in logs and on real buses.
         channel: name of the bus, without blanks.
-        frame: the frame.
-        sent: whether this program sent it.
+        frame: frame on the bus.
+        sent: whether this program sent the frame.
     """
 
     at_us: int
@@ -63,14 +63,16 @@ class Record(NamedTuple):
 
 
 class LineRecord(NamedTuple):
-    """A message of a serial line; a trace can contain it and `Record`, and filters accept both.
+    """A message of a serial line.
+
+    A trace can contain it and `Record`, and filters accept both types.
 
     Attributes:
-        at_us: time of its last byte.
+        at_us: time of the last byte.
         channel: name of the line.
-        sent: whether the host sent it to the device.
-        data: its bytes, without line end or header.
-        decoded: its meaning.
+        sent: whether the host sent the message to the device.
+        data: bytes of the message, without line end or header.
+        decoded: decoded meaning of the message.
     """
 
     at_us: int
@@ -81,23 +83,23 @@ class LineRecord(NamedTuple):
 
     @property
     def frame(self) -> None:
-        """No frame of a CAN bus."""
+        """None, because a message is not a CAN frame."""
         return None
 
 
 AnyRecord = Record | LineRecord
-"""What a trace of buses and serial lines is made of."""
+"""An item of a trace of buses and serial lines."""
 
 
 EXTENDED: Final = 1 << 31
 REMOTE: Final = 1 << 30
 ERROR: Final = 1 << 29
 FD: Final = 1 << 33
-"""Above what an identifier with flags of struct can_frame takes."""
+"""Flag of CAN FD. It is above the identifier and the flags of struct can_frame."""
 
 
 def ident_of(frame: CanFrame) -> int:
-    """Return the CAN-ID with a bit each for an extended and for a remote frame.
+    """Return the CAN-ID with a bit for an extended frame and a bit for a remote frame.
 
     >>> hex(ident_of(CanFrame.parse("00000605#R")))
     '0xc0000605'
@@ -106,7 +108,7 @@ def ident_of(frame: CanFrame) -> int:
 
 
 def fd_ident(frame: FdFrame) -> int:
-    """Return the CAN-ID with a bit each for an extended and for a CAN FD frame.
+    """Return the CAN-ID with a bit for an extended frame and a bit for a CAN FD frame.
 
     >>> hex(fd_ident(FdFrame.parse("00000605##1")))
     '0x280000605'
@@ -120,7 +122,7 @@ def any_ident(frame: CanFrame | FdFrame) -> int:
 
 
 def ident_text(ident: int) -> str:
-    """Write an identifier as candump does, with R for remote frames and # for CAN FD frames.
+    """Return an identifier as candump writes it, with R for remote and # for CAN FD frames.
 
     >>> ident_text(0x181), ident_text(0xC000_0605), ident_text(FD | 0x181)
     ('181', '00000605R', '181#')
@@ -130,10 +132,12 @@ def ident_text(ident: int) -> str:
 
 
 def parse_ident(text: str) -> int:
-    """Read what `ident_text` writes: 3 digits for 11-bit identifiers, 8 for 29-bit ones.
+    """Read an identifier that `ident_text` wrote.
+
+    An 11-bit identifier has 3 digits, a 29-bit identifier has 8.
 
     Raises:
-        ValueError: not an identifier.
+        ValueError: the text is not an identifier.
 
     >>> parse_ident("181"), parse_ident("181R") == 0x181 | REMOTE, parse_ident("181#") == 0x181 | FD
     (385, True, True)
@@ -150,14 +154,14 @@ _NODE_BITS: Final = 7
 _NODE_MASK: Final = 0x7F
 
 _FUNCTIONS: Final = frozenset([1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14])
-"""Function codes that go with a node-ID: EMCY, PDO1 to PDO4, SDO, error control."""
+"""Function codes that include a node-ID: EMCY, PDO1 to PDO4, SDO, error control."""
 
 _SENDING: Final = frozenset([1, 3, 5, 7, 9, 11, 14])
-"""Those of them that the node itself sends with: EMCY, TPDO1 to TPDO4, SDO, error control."""
+"""Function codes of these that the node sends: EMCY, TPDO1 to TPDO4, SDO, error control."""
 
 
 def node_of(ident: int) -> int | None:
-    """Return the node-ID of an identifier; None if it has none by default.
+    """Return the node-ID of an identifier, or None if it has none by default.
 
     A configured COB-ID may belong to another node.
 
@@ -170,7 +174,7 @@ def node_of(ident: int) -> int | None:
 
 
 def sender_of(ident: int) -> int | None:
-    """Return the node-ID that sends with an identifier by default; None if there is none.
+    """Return the node-ID that sends an identifier by default, or None if there is none.
 
     >>> sender_of(0x181), sender_of(0x581), sender_of(0x201), sender_of(0x701 | REMOTE)
     (1, 1, None, None)
@@ -184,7 +188,7 @@ _ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
 
 
 def flagged_id(record: Record) -> int:
-    """Return the identifier with its flags, as struct can_frame has it (linux/can.h)."""
+    """Return the identifier with its flags, as in struct can_frame (linux/can.h)."""
     frame = record.frame
     if isinstance(frame, ErrorFrame):
         return ERROR_FLAG | frame.error_class
@@ -193,13 +197,13 @@ def flagged_id(record: Record) -> int:
 
 @dataclass(frozen=True, slots=True)
 class CandumpFilter:
-    """The filter that selects frames.
+    """A filter that selects frames by rules of candump.
 
-    As in candump, a frame passes if it matches one rule. With `j` among the words it must match all
-    rules. Without a rule all frames pass. Error frames pass only by `#MASK`.
+    As in candump, a frame passes if it matches one rule. With `j` among the words, it must match
+    all rules. Without a rule, all frames pass. Error frames pass only by `#MASK`.
 
     Attributes:
-        rules: identifier, mask, and whether the rule is inverse.
+        rules: identifier, mask, and whether the rule is inverse, for each rule.
         error_mask: classes of error frames that pass.
         joined: whether a frame must match all rules.
     """
@@ -210,7 +214,7 @@ class CandumpFilter:
 
     @classmethod
     def parse(cls, text: str) -> CandumpFilter:
-        """Read the words behind a bus; ValueError if one is no filter."""
+        """Read the words after a bus. Raise ValueError if a word is not a filter."""
         rules, error_mask, joined = [], 0, False
         for word in text.split(","):
             if rule := _RULE.fullmatch(word):
@@ -226,7 +230,7 @@ class CandumpFilter:
         return cls(tuple(rules), error_mask, joined)
 
     def passes(self, flagged: int) -> bool:
-        """Return whether a frame is wanted, by its identifier with flags."""
+        """Return whether a frame passes, by its identifier with flags."""
         if flagged & ERROR_FLAG and not flagged & EXTENDED:
             return bool(flagged & self.error_mask & ~ERROR_FLAG)
         held = ((flagged & mask == ident & mask) != inverse for ident, mask, inverse in self.rules)
@@ -237,7 +241,7 @@ class CandumpFilter:
 
 
 def ms_text(time_us: int | None) -> str:
-    """Write a time in milliseconds, with at most 8 characters up to 11 days.
+    """Return a time in milliseconds as text, with at most 8 characters up to 11 days.
 
     >>> ms_text(None), ms_text(1_234), ms_text(999_999), ms_text(12_345_678)
     ('-', '1.234', '999.999', '12345.7')
@@ -250,7 +254,7 @@ def ms_text(time_us: int | None) -> str:
 
 
 def s_text(time_us: int) -> str:
-    """Write an age in seconds; what lies in the future has none.
+    """Return an age in seconds as text. A time in the future has no age.
 
     >>> s_text(-5), s_text(12_340_000), s_text(123_456_000_000)
     ('0.0', '12.3', '123456')
@@ -259,7 +263,7 @@ def s_text(time_us: int) -> str:
 
 
 def rate_text(per_s: float) -> str:
-    """Write a rate, no more than 7 characters.
+    """Return a rate as text of at most 7 characters.
 
     >>> rate_text(0.0), rate_text(9.987), rate_text(12345.6)
     ('0.00', '9.99', '12346')
@@ -268,7 +272,7 @@ def rate_text(per_s: float) -> str:
 
 
 def load_text(bits_s: int, bit_rate: int | None) -> str:
-    """Write a load: in percent of the bit rate if that is known, otherwise in bits per second.
+    """Return a load as text, in percent of the bit rate if that is known, or in bits per second.
 
     >>> load_text(123_456, 1_000_000), load_text(123_456, None)
     ('12.3 %', '123.5 kbit/s')
@@ -279,16 +283,16 @@ def load_text(bits_s: int, bit_rate: int | None) -> str:
 
 
 def count_text(count: int | None) -> str:
-    """Write a count, a dash where there is none."""
+    """Return a count as text, or a dash without a count."""
     return "-" if count is None else str(count)
 
 
 DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
-"""Of the longest data, which what a frame means stands behind."""
+"""Width of the longest data text. The meaning of a frame starts after it."""
 
 
 class Stamp(StrEnum):
-    """What stands before a frame, as candump's `-t` names it."""
+    """Format of the time before a frame, with the names of candump's `-t`."""
 
     NONE = ""
     ABSOLUTE = "a"
@@ -298,15 +302,15 @@ class Stamp(StrEnum):
 
 
 STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
-"""In the order in which a key shows them."""
+"""Formats in the order in which a key shows them."""
 
 
 def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
-    """Write a time.
+    """Return a time as text.
 
     Args:
         stamp: format of the time.
-        at_us: the time.
+        at_us: time to write.
         origin_us: time of the first frame.
         before_us: time of the previous item.
 
@@ -325,7 +329,7 @@ def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
 
 
 class DumpLines:
-    """Writes one line for each frame.
+    """Writer that makes one line from each frame.
 
     After a first 29-bit identifier, 11-bit identifiers are indented.
 
@@ -335,7 +339,7 @@ class DumpLines:
 
     Attributes:
         form: format of the time before a frame.
-        first_us: time of the first frame; None before it.
+        first_us: time of the first frame, or None before it.
         last_us: time of the last frame.
         width: number of digits of identifiers.
     """
@@ -346,7 +350,7 @@ class DumpLines:
         self.last_us, self.width = 0, 3
 
     def line(self, record: Record, text: str = "") -> str:
-        """Return the line, with what the frame means behind it."""
+        """Return the line of a frame, with the meaning of the frame after it."""
         ident = _ident(record.frame)
         self.width = max(self.width, len(ident))
         direction = ""
@@ -389,7 +393,7 @@ def _ident(frame: AnyFrame) -> str:
 
 
 def _data(frame: AnyFrame) -> str:
-    """Return length and data; a length of two digits begins a column earlier."""
+    """Return length and data. A length of two digits begins a column earlier."""
     data = frame.data.hex(" ").upper()
     if isinstance(frame, CanFrame):
         if frame.remote:
@@ -401,17 +405,20 @@ def _data(frame: AnyFrame) -> str:
 
 
 def seconds_text(span_us: int, digits: int) -> str:
-    """Write seconds; a time that runs backwards has a sign."""
+    """Return seconds as text. A negative time has a sign."""
     seconds, micros = divmod(abs(span_us), 1_000_000)
     return f"{'-' * (span_us < 0)}{seconds:0{digits}d}.{micros:06d}"
 
 
 DATED_US: Final = 1_000_000_000_000_000
-"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
+"""Time (September 2001) below which times are no dates, but count from a recorder's start."""
 
 
 def date_text(at_us: int) -> str:
-    """Write a time since the epoch as the local date and time; without a date after 9999."""
+    """Return a time since the epoch as local date and time.
+
+    A time after the year 9999 has no date.
+    """
     from datetime import datetime  # noqa: PLC0415 - seldom wanted
 
     seconds, micros = divmod(at_us, 1_000_000)
@@ -422,12 +429,12 @@ def date_text(at_us: int) -> str:
 
 
 class LogTime(NamedTuple):
-    """A moment of a log, as written by a user.
+    """A moment of a log, as the user wrote it.
 
     Attributes:
         us: microseconds since the epoch if `dated`, otherwise after the first frame of the log.
-        dated: whether it is a date, or seconds since the epoch.
-        text: the moment as written.
+        dated: whether the moment is a date, or seconds since the epoch.
+        text: text of the moment.
     """
 
     us: int
@@ -435,12 +442,12 @@ class LogTime(NamedTuple):
     text: str
 
     def after(self, first_us: int) -> int:
-        """Return it on the clock of a log whose first frame came at this time."""
+        """Return the moment on the clock of a log whose first frame has this time."""
         return self.us if self.dated else first_us + self.us
 
 
 _EPOCH_S: Final = 1_000_000_000
-"""Numbers from here on are seconds of the epoch (September 2001): no log is so long."""
+"""Number from which seconds count since the epoch (September 2001). No log is that long."""
 
 
 def parse_log_time(text: str) -> LogTime:
@@ -449,7 +456,7 @@ def parse_log_time(text: str) -> LogTime:
     A date without a zone is in the zone of this machine, as displayed.
 
     Raises:
-        ValueError: it is not one of these.
+        ValueError: the text is not such a moment.
 
     >>> parse_log_time("2.5"), parse_log_time("300ms").us
     (LogTime(us=2500000, dated=False, text='2.5'), 300000)
@@ -482,14 +489,14 @@ def _date_us(text: str) -> int:
 
 
 def line_text(line: LineRecord, text: str) -> str:
-    """Write the line, with what it means behind it."""
+    """Return the line as text, with its meaning after it."""
     data = bytes_text(line.data)
     shown = f"{data:<{DATA_WIDTH}}   {text}" if text else data
     return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
 
 
 def decoded_text(decoded: Decoded | None) -> str:
-    """Write what a frame means: node, kind, and what it says."""
+    """Return the meaning of a frame as text, with node, kind and content."""
     if decoded is None or decoded.kind == "raw":
         return ""
     node = "" if decoded.node is None else f"{decoded.node} "
@@ -497,7 +504,7 @@ def decoded_text(decoded: Decoded | None) -> str:
 
 
 def bytes_text(data: bytes) -> str:
-    r"""Write bytes as text where they are all printable, else in hex.
+    r"""Return bytes as text if all are printable, or else in hex.
 
     >>> bytes_text(b"SA:64"), bytes_text(b"\x01A")
     ('SA:64', '01 41')

@@ -26,7 +26,7 @@ from tickrig.wire.errors import FieldError
 
 
 class Origin(StrEnum):
-    """Where a value was seen last."""
+    """Source in which a value was seen last."""
 
     NONE = ""
     EDS = "eds"  # its power-on value
@@ -38,12 +38,12 @@ class ObjectRow(NamedTuple):
     """An object and its latest value.
 
     Attributes:
-        entry: index and sub-index.
-        text: its name, type and unit.
-        value: value for display; empty if unknown.
-        origin: where the value was seen.
-        at_us: time of the value; None for a value of the EDS.
-        trouble: why the latest transfer failed; empty if it did not fail.
+        entry: index and sub-index of the object.
+        text: name, type and unit of the object.
+        value: value for display, empty if unknown.
+        origin: source in which the value was seen.
+        at_us: time of the value, or None for a value of the EDS.
+        trouble: reason why the latest transfer failed, empty if it did not fail.
     """
 
     entry: tuple[int, int]
@@ -55,11 +55,11 @@ class ObjectRow(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its data type, empty if unknown."""
+        """Data type of the object, empty if unknown."""
         return "" if self.text.kind is None else self.text.kind.name
 
     def matches(self, wanted: str) -> bool:
-        """Return whether a text is part of its name, or the beginning of its index.
+        """Return whether a text is part of the object's name, or the beginning of its index.
 
         >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
         >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
@@ -70,13 +70,13 @@ class ObjectRow(NamedTuple):
 
 
 _FIRST_OBJECT: Final = 0x1000
-"""Below it are data types (CiA 301, structure of the object dictionary)."""
+"""First index of objects. Lower indices are data types (CiA 301, object dictionary structure)."""
 
 _MAPPINGS: Final = {"tpdo": 0x1A00, "rpdo": 0x1600}
 
 
 class _Observed(NamedTuple):
-    """A value, and how it came."""
+    """A value with its origin."""
 
     at_us: int
     value: str
@@ -84,10 +84,10 @@ class _Observed(NamedTuple):
 
 
 class NodeDictionary:
-    """Keeps the values of the objects of one node.
+    """The values of the objects of one node.
 
     Args:
-        memory: the knowledge from the EDS and from SDO traffic.
+        memory: knowledge from the EDS and from SDO traffic.
     """
 
     def __init__(self, memory: NodeMemory) -> None:
@@ -104,7 +104,7 @@ class NodeDictionary:
             self._pdos[decoded.kind] = at_us, decoded
 
     def rows(self, wanted: str = "") -> list[ObjectRow]:
-        """Return the objects that are meant, by index; all for an empty text."""
+        """Return the objects that match a text, by index. An empty text matches all objects."""
         seen = self._latest()
         entries = sorted({*self.memory.eds.texts, *seen, *self._troubles})
         objects = (entry for entry in entries if entry[0] >= _FIRST_OBJECT)
@@ -125,7 +125,7 @@ class NodeDictionary:
             self._troubles[entry] = transfer.outcome
 
     def _latest(self) -> dict[Entry, _Observed]:
-        """Return the latest values, those of PDOs among them."""
+        """Return the latest values, including values in PDOs."""
         seen = dict(self._values)
         for kind, (at_us, decoded) in self._pdos.items():
             mapped = self._mapped(kind)
@@ -137,7 +137,7 @@ class NodeDictionary:
         return seen
 
     def _mapped(self, kind: str) -> dict[str, Entry]:
-        """Return what is mapped to a PDO, by the names that the decoder gives."""
+        """Return the objects that a PDO carries, by the names that the decoder uses."""
         index = _MAPPINGS[kind[:4]] + int(kind[4:]) - 1
         count = min(self.memory.number(index, 0) or 0, MAX_MAPPED_OBJECTS)
         found = (
@@ -159,20 +159,20 @@ class NodeDictionary:
 
 _LEAST_NAME: Final = 12
 _SHORT_NAME: Final = 16
-"""Names are made no shorter than this, however narrow the screen is."""
+"""Minimum length of a shortened name, however narrow the screen is."""
 _MOST_NAME: Final = 36
 VALUE: Final = 20
 _BESIDE_NAME: Final = 60
-"""What the other columns take."""
+"""Width of the other columns."""
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
-    """Return a head, and a line for each object; an error is shown in place of its type.
+    """Return a head, and a line for each object. An error is shown in place of the type.
 
     Args:
-        rows: the objects.
-        now_us: the time to which ages refer.
-        width: columns of the screen, which limit the length of names; 0 for no limit.
+        rows: objects to show.
+        now_us: time to which ages refer.
+        width: columns of the screen, which limit the length of names, or 0 for no limit.
     """
     longest = max((len(row.text.name) for row in rows), default=0)
     most = max(_SHORT_NAME, width - _BESIDE_NAME) if width else _MOST_NAME
@@ -182,7 +182,7 @@ def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) ->
 
 
 def _shortened(name: str, width: int) -> str:
-    """Return a shortened name; its end distinguishes entries, so it is kept.
+    """Return a shortened name. Its end distinguishes entries, so the end is kept.
 
     >>> _shortened("pre_defined_error_field.error_1", 20)
     'pre_defin…ld.error_1'
@@ -211,15 +211,14 @@ _TRUTH: Final = {"true": 1, "false": 0}
 
 
 def encode_value(text: ObjectText, words: str) -> bytes:
-    """Return the bytes of a value, written as the table shows it: in the unit of the object.
+    """Return the bytes of a value that is written as in the table, in the unit of the object.
 
     Args:
-        text: the known description of the object; without a known type, the value is written as
-            bytes.
-        words: the value as text; bytes are in hex.
+        text: known description of the object. Without a known type, the value is written as bytes.
+        words: value as text. Bytes are in hex.
 
     Raises:
-        ValueError: not a value of this object.
+        ValueError: the text is not a value of this object.
     """
     kind = text.kind
     if kind in _TEXTS:
@@ -236,7 +235,7 @@ def encode_value(text: ObjectText, words: str) -> bytes:
 
 
 def _on_the_wire(text: ObjectText, kind: DataType, value: float) -> float:
-    """Return the number that is sent: the nearest step, where the object has a factor."""
+    """Return the number to send, which is the nearest step if the object has a factor."""
     if text.factor == 1 or text.in_hex:
         return value
     scaled = value / text.factor

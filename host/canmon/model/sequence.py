@@ -1,6 +1,6 @@
-"""Sequences: frames to send and frames to expect, step by step; the caller passes the time.
+"""Sequences of frames to send and to expect, step by step. The caller passes the time.
 
-The execution of a sequence, and its conditions: frames by a pattern or a filter.
+The module executes sequences. Their conditions are frames, given by a pattern or a filter.
 
 >>> from tickrig.wire.can import CanFrame
 >>> frames = map(CanFrame.parse, ("585#6041", "585#60F1AA", "585#6042"))
@@ -54,26 +54,25 @@ _BINARY: Final[dict[type[ast.operator], Callable[[int, int], int]]] = {
 }
 _MOST_BITS: Final = 64
 _LONGEST: Final = 1_000
-"""Characters of an expression."""
+"""Maximum number of characters of an expression."""
 
 
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
-    """Replace each field by its number.
+    """Replace each field of a text by its number.
 
-    A text with a `#` is a frame: there a field becomes two hex digits. In other texts it becomes a
-    decimal number. `:3` in a field means three hex digits, `:i16` two bytes with the low byte
-    first, `:d` a decimal number.
+    A text with a `#` is a frame, in which a field becomes two hex digits. In other texts, a field
+    becomes a decimal number. `:3` in a field means three hex digits, `:i16` two bytes with the low
+    byte first, `:d` a decimal number.
 
     Raises:
-        ValueError: an unknown variable, a value that is not a whole number, or a number that does
-            not fit.
+        ValueError: a variable is unknown, a value is not a whole number, or a number does not fit.
     """
     usual = "2" if "#" in text else "d"
     return _FIELD.sub(lambda match: _written(match[1], match[2] or usual, variables), text)
 
 
 def parse_variable(text: str) -> tuple[str, int]:
-    """Read `NAME=NUMBER` of a command line; ValueError if it is not that."""
+    """Read `NAME=NUMBER` of a command line. Raise ValueError for other texts."""
     name, _, number = text.partition("=")
     try:
         if not name.isidentifier():
@@ -84,10 +83,10 @@ def parse_variable(text: str) -> tuple[str, int]:
 
 
 def evaluate(text: str, variables: Mapping[str, int]) -> int:
-    """Return what whole numbers and variables come to.
+    """Return the result of an expression with whole numbers and variables.
 
     Raises:
-        ValueError: something else, or more than 64 bits.
+        ValueError: the text is another expression, or the result has more than 64 bits.
     """
     try:
         if len(text) > _LONGEST:
@@ -197,17 +196,20 @@ def parse_pattern(text: str) -> FrameCondition:
 
 
 class DecodedCondition:
-    """Keeps the latest frame with its meaning, for the conditions of a sequence."""
+    """The latest frame with its meaning, used for the conditions of a sequence."""
 
     def __init__(self) -> None:
         self._latest: tuple[Record, Decoded] | None = None
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Take a frame; conditions are asked about it next."""
+        """Take a frame. The next conditions apply to this frame."""
         self._latest = record, decoded
 
     def condition(self, text: str) -> FrameCondition:
-        """Return the condition of a filter expression; ValueError if it is none."""
+        """Return the condition of a filter expression.
+
+        Raise ValueError if the text is not a filter.
+        """
         chosen = parse_filter(text)
 
         def matches(record: Record) -> bool:
@@ -218,16 +220,16 @@ class DecodedCondition:
 
 
 _FrameStep = Step[Frames, Record]
-"""Sends frames, waits, expects frames, or repeats other steps."""
+"""Step that sends frames, waits, expects frames, or repeats other steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """Steps, and the function that locates them.
+    """The steps of a sequence, and the function that locates them.
 
     Attributes:
-        steps: in order.
-        locate: returns `FILE:LINE` of a place.
+        steps: steps in order.
+        locate: function that returns `FILE:LINE` of a place.
     """
 
     steps: tuple[_FrameStep, ...]
@@ -235,7 +237,7 @@ class Sequence:
 
 
 class EventType(StrEnum):
-    """What a note is about."""
+    """Type of an event."""
 
     SENT = ">"
     MET = "ok"
@@ -244,7 +246,7 @@ class EventType(StrEnum):
 
 
 class SequenceEvent(NamedTuple):
-    """What happened when."""
+    """An event of the execution, with its time."""
 
     at_us: int
     mark: EventType
@@ -257,23 +259,23 @@ class _Pause(NamedTuple):
 
 
 _Play = Generator[_Pause, bool, bool]
-"""Yields pauses, is sent whether they were met, and returns whether to carry on."""
+"""Generator that yields pauses, receives whether they were met, and returns whether to continue."""
 
 
 class SequenceRun:
-    """Executes a sequence as time passes.
+    """The execution of a sequence as time passes.
 
     A wait counts from the time at which the previous step was due, so that waits do not drift. In
     each call, frames are processed before time-outs.
 
     Args:
-        sequence: the sequence to execute.
+        sequence: sequence to execute.
 
     Attributes:
-        done: whether it has ended.
+        done: whether the sequence has ended.
         met: number of expectations that were met.
         missed: number of expectations that were missed.
-        events: the events of the execution; code that displays them may remove them.
+        events: events of the execution. Code that displays the events may remove them.
     """
 
     def __init__(self, sequence: Sequence) -> None:
@@ -288,15 +290,15 @@ class SequenceRun:
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame."""
+        """Time of the next call that is necessary without a frame."""
         return self._pause.until_us
 
     def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
-        """Process received frames, do what is due, and return the frames to send.
+        """Process received frames, do the work that is due, and return the frames to send.
 
         Args:
-            now_us: the time; the first call begins the sequence.
-            records: frames since the last call; those that this program sent are ignored.
+            now_us: current time. The first call begins the sequence.
+            records: frames since the last call. Frames that this program sent are ignored.
         """
         if not self._begun:
             self._begun, self._at_us = True, now_us
@@ -322,7 +324,7 @@ class SequenceRun:
                 return
 
     def _resume(self, at_us: int, met: bool | None) -> None:
-        """Carry on at a time up to the next pause; None begins."""
+        """Continue at a time up to the next pause. None begins the sequence."""
         self._at_us = at_us
         try:
             self._pause = next(self._play) if met is None else self._play.send(met)
@@ -373,7 +375,7 @@ class SequenceRun:
 
 
 def event_line(event: SequenceEvent) -> str:
-    """Write a note: seconds, mark, and what happened.
+    """Return an event as text, with seconds, mark and description.
 
     >>> from tickrig.host.canmon.model.sequence import EventType
     >>> event_line(SequenceEvent(4_718, EventType.MET, "703#05"))
@@ -383,7 +385,7 @@ def event_line(event: SequenceEvent) -> str:
 
 
 def outline(steps: tuple[_FrameStep, ...], depth: int = 0) -> list[str]:
-    """Return the steps as lines for people, indented where they are repeated."""
+    """Return the steps as lines for the user. Repeated steps are indented."""
     lines = []
     for step in steps:
         lines += ["  " * depth + text for text in _step_texts(step)]
@@ -417,7 +419,7 @@ def parse_lines(text: str, file: str) -> Sequence:
     lines three times, `loop forever` until the sequence is stopped. `#` begins a comment.
 
     Raises:
-        StepError: `FILE:LINE: what came, what is allowed`.
+        StepError: a line is invalid. The message is `FILE:LINE: what came, what is allowed`.
     """
     steps: list[_FrameStep] = []
     times = 1
@@ -465,10 +467,10 @@ _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "expect": ("within", "on-fail"),
     "repeat": ("steps",),
 }
-"""What a step does, and what else it may say."""
+"""Kinds of steps, and the further keys that each kind allows."""
 
 _WITHIN: Final = "1s"
-"""How long an expectation waits that does not say."""
+"""Time limit of an expectation that gives none."""
 
 _TOP: Final = ("name", "vars", "step")
 
@@ -480,14 +482,16 @@ class _Wrong(Exception):  # noqa: N818 - never leaves this file
 
 
 class TomlSequence:
-    """Parses one file.
+    """Parser of one file.
 
     Args:
         text: content of the file.
-        file: its name, for messages.
+        file: name of the file for messages.
         variables: values that override those of `[vars]`.
-        resolve: makes a frame from what a step sends, if that is not a frame in candump notation.
-        condition: makes a condition from what a step expects, if that is not a pattern of a frame.
+        resolve: function that makes a frame from the text of a step, if it is not a frame in
+            candump notation.
+        condition: function that makes a condition from an expected text, if it is not a pattern of
+            a frame.
     """
 
     def __init__(
@@ -506,10 +510,10 @@ class TomlSequence:
         self._variables: dict[str, int] = {}
 
     def parse(self) -> Sequence:
-        """Read it.
+        """Read the file.
 
         Raises:
-            StepError: `FILE:LINE: what came, what is allowed`.
+            StepError: the file is invalid. The message is `FILE:LINE: what came, what is allowed`.
         """
         top = self._document.values
         for line, reason in self._document.mistakes:

@@ -48,16 +48,16 @@ _MOST_SIGNALS: Final = 400
 
 
 class TimeBins(Generic[_Key]):
-    """Sums over spans of time of equal width; the width doubles when there are too many spans.
+    """Sums over spans of time of equal width. The width doubles when there are too many spans.
 
     Args:
-        most: largest number of spans.
+        most: maximum number of spans.
         width_us: initial width of a span.
 
     Attributes:
         width_us: present width of a span.
-        sums: by key, the sum of each span with values.
-        ranges: by key, the least and the greatest value of each span with values.
+        sums: sum of each span with values, by key.
+        ranges: least and greatest value of each span with values, by key.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
@@ -66,7 +66,7 @@ class TimeBins(Generic[_Key]):
         self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
-        """Make room for a time; spans are merged if there are too many."""
+        """Make room for a time. Spans are merged if there are too many."""
         shift = (at_us // self.width_us // self._most).bit_length()
         if not shift:
             return
@@ -84,27 +84,27 @@ class TimeBins(Generic[_Key]):
             self.ranges[name] = joined
 
     def add(self, key: _Key, at_us: int, amount: int) -> None:
-        """Add to the span of a time."""
+        """Add to the span that contains a time."""
         self.reach(at_us)
         self.add_at(key, at_us // self.width_us, amount)
 
     def add_at(self, key: _Key, place: int, amount: int) -> None:
-        """Add to a span; `reach` has made room for it."""
+        """Add to a span. `reach` has made room for the span."""
         spans = self.sums.setdefault(key, {})
         spans[place] = spans.get(place, 0) + amount
 
     def spread_at(self, key: _Key, place: int, low: float, high: float) -> None:
-        """Let the range of a span hold these values; `reach` has made room for it."""
+        """Extend the range of a span by these values. `reach` has made room for the span."""
         spans = self.ranges.setdefault(key, {})
         was = spans.get(place)
         spans[place] = (low, high) if was is None else (min(was[0], low), max(was[1], high))
 
 
 class Thinned(Generic[_T]):
-    """Items in their order: all of them, or, if there are many, every second or every fourth one.
+    """Items in their order. If there are many items, only every second or every fourth is kept.
 
     Attributes:
-        items: the items that are kept.
+        items: items that are kept.
         count: number of all items.
     """
 
@@ -114,7 +114,7 @@ class Thinned(Generic[_T]):
         self.count = 0
 
     def append(self, item: _T) -> None:
-        """Take one more."""
+        """Add one more item."""
         if self.count % self._step == 0:
             self.items.append(item)
             if len(self.items) > 2 * self._most:
@@ -123,7 +123,10 @@ class Thinned(Generic[_T]):
         self.count += 1
 
     def pass_over(self) -> bool:
-        """Count one more that would not be kept; return False, and count nothing, if it would."""
+        """Count one more item that would not be kept.
+
+        Return False without counting if it would be kept.
+        """
         if self.count % self._step == 0:
             return False
         self.count += 1
@@ -131,10 +134,10 @@ class Thinned(Generic[_T]):
 
 
 class _Bands:
-    """States, with their start times; of several in one span of time, the last one is kept.
+    """States with their start times. Of several states in one span of time, the last one is kept.
 
     Attributes:
-        changes: time and state, in order.
+        changes: time and state of each change, in order.
         count: number of all changes.
     """
 
@@ -144,7 +147,7 @@ class _Bands:
         self.count = 0
 
     def take(self, at_us: int, state: str) -> None:
-        """Take a state; one that goes on is no change."""
+        """Take a state. A state that continues is not a change."""
         if self.changes and self.changes[-1][1] == state:
             return
         self.count += 1
@@ -159,7 +162,7 @@ class _Bands:
 
 
 class SignalName(NamedTuple):
-    """Which signal it is: of a node's PDO, or of a message of a DBC file."""
+    """The name of a signal of a node's PDO, or of a message of a DBC file."""
 
     channel: str
     node: int | None
@@ -169,11 +172,11 @@ class SignalName(NamedTuple):
 
 @dataclass(slots=True)
 class SignalTrack:
-    """A signal over time; its values are in the bins.
+    """A signal over time. The values are in the bins.
 
     Attributes:
         unit: unit of the values.
-        source: source of its name.
+        source: source of the signal's name.
         count: number of values.
         low, high: the least and the greatest value.
         states: states of a signal whose values have names; None for a number.
@@ -212,13 +215,13 @@ class _NodeLane:
     """The history of one node.
 
     Attributes:
-        states: NMT states that it reported or that were commanded.
-        boots: boot-ups.
-        commands: NMT commands to it.
-        emcys: EMCYs.
+        states: NMT states that the node reported or that were commanded.
+        boots: boot-ups of the node.
+        commands: NMT commands to the node.
+        emcys: EMCY messages of the node.
         transfers: successful SDO transfers.
         failures: failed SDO transfers.
-        gaps: times without a due heartbeat, each from the last heartbeat on.
+        gaps: times without a due heartbeat. Each time starts at the last heartbeat.
     """
 
     states: _Bands = field(default_factory=_Bands)
@@ -234,20 +237,20 @@ class Survey(NodeBoard):
     """A node board that also stores the history.
 
     Args:
-        decoder: decodes the frames that the survey processes.
-        expected: as for `NodeBoard`.
-        rates: of the buses, for the length of CAN FD frames.
+        decoder: decoder of the frames that the survey processes.
+        expected: nodes with an EDS, as for `NodeBoard`.
+        rates: bit rates of the buses, used for the length of CAN FD frames.
 
     Attributes:
-        first_us: time of the first frame; None before it.
+        first_us: time of the first frame, or None before it.
         last_us: time of the latest frame.
-        frames: number of frames, by bus.
-        counts: frames by bus and identifier.
+        frames: number of frames by bus.
+        counts: number of frames by bus and identifier.
         bits: number of bits on each bus.
-        errors: error frames on each bus.
-        values: values of signals.
-        lanes: lanes of nodes, by bus and node-ID.
-        signals: the signals, by name.
+        errors: number of error frames on each bus.
+        values: values of signals in bins.
+        lanes: lanes of nodes by bus and node-ID.
+        signals: signals by name.
         signals_left: names of signals for which there was no room.
     """
 
@@ -271,16 +274,19 @@ class Survey(NodeBoard):
         self.signals_left: set[SignalName] = set()
 
     def since(self, at_us: int) -> int:
-        """Return a time since the first frame, not below 0."""
+        """Return a time since the first frame, which is at least 0."""
         return max(0, at_us - (self.first_us or 0))
 
     def begin(self, at_us: int) -> None:
-        """Take the time of the first frame."""
+        """Record the time of the first frame."""
         if self.first_us is None:
             self.first_us = self.last_us = at_us
 
     def reach(self, since_us: int) -> int:
-        """Make room for a time in all bins, which are alike; return its place in them."""
+        """Make room for a time in all bins, which have equal spans.
+
+        Return the index of its span.
+        """
         for bins in (self.counts, self.bits, self.errors, self.values):
             bins.reach(since_us)
         return since_us // self.bits.width_us
@@ -300,7 +306,7 @@ class Survey(NodeBoard):
         self.bits.add_at(channel, place, bits)
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Take a frame for the lanes of nodes; it may be counted elsewhere."""
+        """Take a frame for the lanes of nodes. The frame may be counted elsewhere."""
         kind, node, channel = decoded.kind, decoded.node, record.channel
         since_us = self.since(record.at_us)
         row = None if node is None else self.row(channel, node)
@@ -338,7 +344,7 @@ class Survey(NodeBoard):
             self._take_signal(name, since_us, signal, decoded.source)
 
     def track(self, name: SignalName, unit: str, source: str) -> SignalTrack | None:
-        """Return the track of a signal; None if there is no room for one more."""
+        """Return the track of a signal, or None if there is no room for one more."""
         track = self.signals.get(name)
         if track is None:
             if len(self.signals) >= _MOST_SIGNALS:
@@ -349,7 +355,7 @@ class Survey(NodeBoard):
         return track
 
     def end(self) -> None:
-        """Take the end of the log: heartbeats that were due by then are missing."""
+        """Process the end of the log. Heartbeats that were due by then are missing."""
         for row in self.rows():
             if row.reported_us is not None and row.is_late(self.last_us):
                 self._gap(row.channel, row.node, row.reported_us, self.last_us)
@@ -406,18 +412,18 @@ class Survey(NodeBoard):
 
 
 class Piece(Protocol):
-    """Some frames of a log, in their order."""
+    """Some frames of a log in their order."""
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of frames."""
 
     def cut(self, begin: int, end: int, /) -> list[Record]:
-        """Return some of them, by their places."""
+        """Return some of the frames by their positions."""
 
 
 @dataclass(slots=True)
 class _Excerpt:
-    """The frames around one of them."""
+    """The frames around one of the frames."""
 
     number: int
     records: list[Record]
@@ -430,10 +436,10 @@ def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> di
     Args:
         pieces: all frames of a log.
         numbers: positions of the given frames in the log, from 1.
-        frames: number of frames before and after each.
+        frames: number of frames before and after each given frame.
 
     Returns:
-        By number, the position of the first of its frames in the log, and these frames.
+        The position of the first frame of each excerpt in the log, and its frames, by number.
     """
     order = deque(sorted(set(numbers)))
     found: dict[int, _Frames] = {}

@@ -1,4 +1,4 @@
-"""The table of all identifiers that `canmon top` paints, driven by frames, keys and the time."""
+"""The table of all identifiers that `canmon top` shows. Frames, keys and the time drive it."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ PLAIN: Final = "\x1b[0m"
 _UNCHANGED: Final = "·"
 _NOTCHED: Final = " "
 _HEAT: Final = "▁▂▃▄▅▆▇█"
-"""From a bit that changes seldom to one that changes with each frame."""
+"""Characters for bits, from one that changes seldom to one that changes with each frame."""
 
 
 def _data_text(row: traffic.IdRow, styled: bool) -> str:
-    """Write the bytes of the latest frame; those that it changed are shown in reverse."""
+    """Return the bytes of the latest frame as text. Changed bytes are shown in reverse."""
     if row.frame.remote:
         return f"remote request for {row.frame.dlc}"
     latest = row.changed.latest & ~row.changed.notched
@@ -51,7 +51,7 @@ def _data_text(row: traffic.IdRow, styled: bool) -> str:
 
 
 def _heat_text(row: traffic.IdRow, styled: bool) -> str:
-    """Write a character for each bit, bit 7 of a byte first."""
+    """Return a character for each bit. Bit 7 of a byte is first."""
     heats = _heats(row.changed, row.frames)
     latest = row.changed.latest & ~row.changed.notched
     cells = []
@@ -91,10 +91,11 @@ class _TopColumn(NamedTuple):
     """A column of numbers.
 
     Attributes:
-        title: its head.
+        title: title of the column.
         width: width in characters.
-        rank: without room for all columns, the one with the highest rank is left out first.
-        text: returns its text for a row at a time.
+        rank: rank of the column. Without room for all columns, the column with the highest rank is
+            left out first.
+        text: function that returns the text of a row at a time.
     """
 
     title: str
@@ -122,25 +123,25 @@ _COLUMNS: Final = (
 
 
 class _IdText(NamedTuple):
-    """The leading column: bus, if there are several, and identifier.
+    """The leading column, with the bus if there are several, and the identifier.
 
     Attributes:
-        channel_width: characters of the bus; 0 for none.
+        channel_width: number of characters for the bus, or 0 for none.
     """
 
     channel_width: int
 
     @property
     def width(self) -> int:
-        """Characters in all."""
+        """The width of the column in characters."""
         return self.channel_width + (1 if self.channel_width else 0) + 9
 
     def of(self, row: traffic.IdRow) -> str:
-        """Return what it says of a row."""
+        """Return the text of a row."""
         return self._joined(row.channel, ident_text(row.ident))
 
     def title(self) -> str:
-        """Return its head."""
+        """Return the title of the column."""
         return self._joined("bus", "CAN-ID")
 
     def _joined(self, channel: str, ident: str) -> str:
@@ -162,7 +163,7 @@ def _fitting(width: int) -> tuple[_TopColumn, ...]:
 # The traffic of serial lines: one row for each kind of message, and its table for `canmon top`.
 
 _ANSWERS: Final = ("ok", "refused", "event")
-"""Signals that name a kind of answer."""
+"""Signals whose name is a kind of answer."""
 
 _COMMAND: Final = "command"
 _STATUS: Final = "status"
@@ -174,12 +175,12 @@ class _LineRow(NamedTuple):
 
     Attributes:
         channel: name of the line.
-        sent: whether it goes to the device.
+        sent: whether the messages go to the device.
         word: kind of the message.
         messages: number of messages.
         first_us: time of the first message.
         last_us: time of the latest message.
-        gap_us: time between the previous and the latest message; None for the first.
+        gap_us: time between the previous and the latest message, or None for the first message.
         text: content of the latest message.
     """
 
@@ -194,13 +195,13 @@ class _LineRow(NamedTuple):
 
     @property
     def rate_hz(self) -> float:
-        """Messages a second, on average; 0 of one alone."""
+        """Average number of messages per second, or 0 for a single message."""
         span_us = self.last_us - self.first_us
         return (self.messages - 1) * 1e6 / span_us if span_us > 0 else 0.0
 
 
 class LineTraffic:
-    """Counts messages; what it keeps grows with their kinds, not with their number."""
+    """Counter of messages. Its memory grows with the kinds of messages, not with their number."""
 
     def __init__(self) -> None:
         self._rows: dict[tuple[str, bool, str], _LineRow] = {}
@@ -219,7 +220,7 @@ class LineTraffic:
         )
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Delete all counts."""
         self._rows.clear()
 
     def rows(self) -> tuple[_LineRow, ...]:
@@ -228,7 +229,7 @@ class LineTraffic:
 
 
 def _word_of(decoded: Decoded) -> str:
-    """Return the kind of a message: its command, or what kind of answer it is."""
+    """Return the kind of a message, which is its command or the kind of answer."""
     if not decoded.signals:
         return _OTHER
     first = decoded.signals[0]
@@ -238,7 +239,7 @@ def _word_of(decoded: Decoded) -> str:
 
 
 def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]:
-    """Return the table; nothing where there are no rows."""
+    """Return the table, empty if there are no rows."""
     if not rows:
         return []
     names = [f"{row.channel} {ARROWS[row.sent]} {row.word}" for row in rows]
@@ -261,11 +262,11 @@ _CHANNEL_MAX: Final = 12
 _KEY_LINE: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
 _UNRATED: Final = "load at most (no --data-bitrate)"
 UNBOUNDED: Final = 1 << 16
-"""A width or height that everything fits into."""
+"""Width or height without a limit."""
 
 
 class RowOrder(StrEnum):
-    """By what the rows are sorted."""
+    """Order by which the rows are sorted."""
 
     ID = "id"
     RATE = "rate"
@@ -288,15 +289,16 @@ class TableView:
     """Settings of the display of the table.
 
     Attributes:
-        order: order of its rows.
+        order: order of the rows.
         bits: whether to show bits instead of bytes.
         held: whether the display is paused.
         top: number of rows scrolled past.
-        styled: whether to mark changes; not in text for a file.
-        bit_rate: bit rate of the buses; None if unknown.
+        styled: whether to mark changes. Text for a file has no marks.
+        bit_rate: bit rate of the buses, or None if unknown.
         keys: whether to show a line with the keys.
-        meaning: returns the meaning of the latest frame of a row, shown instead of its bytes.
-        unread: items received that are not frames of CAN or CAN FD.
+        meaning: function that returns the meaning of the latest frame of a row, shown instead of
+            its bytes.
+        unread: number of received items that are not CAN or CAN FD frames.
     """
 
     order: RowOrder = RowOrder.ID
@@ -317,10 +319,10 @@ def render(
     width: int = UNBOUNDED,
     height: int = UNBOUNDED,
 ) -> list[str]:
-    """Return the lines, no more than `height`, none wider than `width`.
+    """Return at most `height` lines of at most `width` characters.
 
     Args:
-        snapshot: the traffic to show.
+        snapshot: traffic to show.
         view: settings of the display.
         lost: number of lost frames.
         width: width of the screen in characters.
@@ -336,7 +338,7 @@ def render(
 
 
 def _bus_line(bus: traffic.BusRow, bit_rate: int | None) -> str:
-    """Write what a bus did in one line."""
+    """Return the state of a bus as one line."""
     load, errors = bus.load, bus.errors
     words = [
         f"{in_cells(bus.channel)}: {bus.frames} frames",
@@ -368,10 +370,10 @@ class _Table(NamedTuple):
     """The parts of the rows that fit the screen.
 
     Attributes:
-        ids: the leading column.
+        ids: leading column with the identifiers.
         columns: columns of numbers.
-        payload: the last cell of a row, and its title.
-        styled: whether to mark changes; the lines are then not cut, because a style must not be
+        payload: last cell of a row, and its title.
+        styled: whether to mark changes. The lines are then not cut, because a style must not be
             cut.
         width: width of the screen in characters.
     """
@@ -384,7 +386,7 @@ class _Table(NamedTuple):
 
     @classmethod
     def of(cls, snapshot: traffic.TrafficSnapshot, view: TableView, width: int) -> _Table:
-        """Choose the columns."""
+        """Choose the columns that fit."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
         ids = _IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
         room = width - ids.width - _payload_width(view) - 1
@@ -394,12 +396,12 @@ class _Table(NamedTuple):
         return cls(ids, columns, _payload(view), styled, width)
 
     def titles(self) -> str:
-        """Return the head."""
+        """Return the line with the titles."""
         cells = [f"{column.title:>{column.width}}" for column in self.columns]
         return " ".join([self.ids.title(), *cells, self.payload[1]])[: self.width]
 
     def line(self, row: traffic.IdRow, now_us: int) -> str:
-        """Return a row."""
+        """Return the line of a row."""
         cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
         line = " ".join([self.ids.of(row), *cells, self.payload[0](row, self.styled)])
         return (line if self.styled else line[: self.width]).rstrip()
@@ -421,20 +423,20 @@ def _payload(view: TableView) -> tuple[Callable[[traffic.IdRow, bool], str], str
 
 
 _PAGE: Final = 10
-"""Rows that a key for a page goes."""
+"""Number of rows for a page key."""
 
 _ORDERS: Final = tuple(RowOrder)
 
 
 class TopModel:
-    """Traffic and the view of it.
+    """The traffic, and the view of the traffic.
 
     Args:
         rates: bit rates of the buses.
 
     Attributes:
         traffic: the counted traffic.
-        view: the settings of its display.
+        view: settings of the display.
     """
 
     def __init__(self, rates: traffic.BitRates = traffic.NO_RATES) -> None:
@@ -457,7 +459,7 @@ class TopModel:
         }
 
     def take(self, records: Iterable[AnyRecord]) -> None:
-        """Count frames, and lines of serial ports, whatever is shown."""
+        """Count frames, and lines of serial ports, whatever is displayed."""
         for record in records:
             if isinstance(record, Record):
                 self.traffic.take(record)
@@ -465,7 +467,7 @@ class TopModel:
                 self._serial.take(record)
 
     def take_decoded(self, decoded_frames: Iterable[tuple[AnyRecord, Decoded | None]]) -> None:
-        """Count frames, and keep what the latest of each identifier means."""
+        """Count frames, and keep the meaning of the latest frame of each identifier."""
         for record, decoded in decoded_frames:
             self.take((record,))
             frame = record.frame
@@ -473,12 +475,12 @@ class TopModel:
                 self._meanings[record.channel, any_ident(frame)] = decoded
 
     def press(self, key: str) -> None:
-        """Act on a key; one without a meaning does nothing."""
+        """Process a key. A key without a meaning does nothing."""
         if key in self._acts:
             self._acts[key]()
 
     def lines(self, now_us: int, lost: int, width: int, height: int, unread: int = 0) -> list[str]:
-        """Return what a screen shows at a time."""
+        """Return the lines of the screen at a time."""
         self._now_us = now_us
         snapshot, rows = self._held or self._snapshot()
         below = line_table(rows, snapshot.at_us, width)[: height // 2]
@@ -486,7 +488,7 @@ class TopModel:
         return render(snapshot, view, lost, width, height - len(below)) + below
 
     def final(self, lost: int, snapshot: traffic.TrafficSnapshot | None = None) -> list[str]:
-        """Return the whole table of all that came, or of a snapshot, as plain text."""
+        """Return the whole table of all traffic, or of a snapshot, as plain text."""
         view = replace(self.view, held=False, top=0, styled=False, keys=False)
         rows = self._serial.rows()
         snapshot = snapshot or self.traffic.snapshot()
@@ -518,7 +520,7 @@ class TopModel:
 
 
 def meaning_text(decoded: Decoded) -> str:
-    """Write what a frame means, with the node and where the names are from."""
+    """Return the meaning of a frame as text, with the node and the source of the names."""
     node = "" if decoded.node is None else f"{decoded.node} "
     source = f" ({decoded.source})" if decoded.source else ""
     return in_cells(f"{node}{decoded.kind} {decoded.text}".rstrip() + source)

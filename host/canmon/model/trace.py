@@ -1,4 +1,4 @@
-"""The latest frames one below the other, with the times between them."""
+"""The latest frames as a list, with the times between them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 _LINE: Final = 1 << 32
-"""In a key: a line of a serial port; 1 above it for those to the device."""
+"""Flag of a line of a serial port in a key. Adding 1 marks lines to the device."""
 
 _CAPACITY: Final = 100_000
 
@@ -29,11 +29,12 @@ class TraceRow(NamedTuple):
 
     Attributes:
         number: number of the frame since the trace began, from 0.
-        record: the frame.
-        since_us: time since the previous frame on any bus; None for the first.
-        gap_us: time since the previous frame with this identifier on this bus; None for the first.
-        changed: bits in which its payload differs from that previous frame; see `BitRow`.
-        decoded: its meaning, if it was decoded.
+        record: frame of the row.
+        since_us: time since the previous frame on any bus, or None for the first frame.
+        gap_us: time since the previous frame with this identifier on this bus, or None for the
+            first frame.
+        changed: bits in which the payload differs from that previous frame; see `BitRow`.
+        decoded: decoded meaning of the frame, if it was decoded.
     """
 
     number: int
@@ -45,10 +46,10 @@ class TraceRow(NamedTuple):
 
 
 class Ring:
-    """Rows with running numbers, the latest kept.
+    """Rows with running numbers, of which the latest are kept.
 
     Args:
-        capacity: how many are kept.
+        capacity: number of rows that are kept.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -57,7 +58,7 @@ class Ring:
 
     @property
     def count(self) -> int:
-        """How many rows were taken."""
+        """The number of rows that were added."""
         return self._count
 
     @property
@@ -71,7 +72,7 @@ class Ring:
         self._count += 1
 
     def rows(self, begin: int, count: int) -> list[TraceRow]:
-        """Return rows by number; those that are given up or not there yet are left out."""
+        """Return rows by number. Dropped and future rows are left out."""
         first = min(max(begin, self.first), self._count)
         end = min(max(begin + count, first), self._count)
         if first - self.first < self._count - end:
@@ -84,20 +85,20 @@ class Ring:
         return self.rows(self._count - count, count)
 
     def copy(self) -> Ring:
-        """Return one that no further row is added to."""
+        """Return a copy to which no further rows are added."""
         found = Ring(self._rows.maxlen or _CAPACITY)
         found._rows.extend(self._rows)
         found._count = self._count
         return found
 
     def clear(self) -> None:
-        """Start again."""
+        """Delete all rows."""
         self._rows.clear()
         self._count = 0
 
 
 class FrameTrace(Ring):
-    """Keeps the latest frames; removes older ones, and counts them.
+    """The latest frames. Older frames are removed and counted.
 
     If time goes back, the time between the frames is 0.
 
@@ -105,7 +106,8 @@ class FrameTrace(Ring):
         capacity: number of frames to keep.
 
     Attributes:
-        origin_us: time of the first frame, the origin of displayed times; None before it.
+        origin_us: time of the first frame, which is the origin of displayed times. It is None
+            before the first frame.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -136,14 +138,14 @@ class FrameTrace(Ring):
         return row
 
     def clear(self) -> None:
-        """Start again."""
+        """Delete all frames."""
         super().clear()
         self._latest.clear()
         self._last_us = self.origin_us = None
 
 
 def _key_of(record: AnyRecord) -> _Key:
-    """Return bus and identifier; error frames are a kind of their own, and so are lines."""
+    """Return bus and identifier. Error frames have a key of their own, and so have lines."""
     if not isinstance(record, Record):
         return record.channel, _LINE + record.sent
     frame = record.frame
@@ -155,11 +157,11 @@ def _since(at_us: int, before_us: int | None) -> int | None:
 
 
 class Latest(NamedTuple):
-    """One identifier of one bus.
+    """The latest frame of one identifier of one bus.
 
     Attributes:
-        row: its latest frame that passed.
-        frames: how many passed.
+        row: latest frame that passed.
+        frames: number of frames that passed.
     """
 
     row: TraceRow
@@ -167,14 +169,14 @@ class Latest(NamedTuple):
 
 
 class DisplayFilter:
-    """Follows a trace.
+    """A filter that follows a trace.
 
     Args:
-        trace: source of the rows; rows that it already holds are included.
-        wanted: returns whether a row passes; None for all.
+        trace: source of the rows. Rows that it already holds are included.
+        wanted: function that returns whether a row passes, or None for all rows.
 
     Attributes:
-        passed: rows that passed; the trace itself if all do.
+        passed: rows that passed. It is the trace itself if all rows pass.
     """
 
     def __init__(self, trace: FrameTrace, wanted: Filter | None = None) -> None:
@@ -185,7 +187,7 @@ class DisplayFilter:
         self.follow()
 
     def follow(self) -> None:
-        """Take the rows that the trace has got since."""
+        """Process the new rows of the trace."""
         wanted = self.wanted
         for row in self._trace.rows(self._seen, self._trace.count - self._seen):
             decoded = row.decoded
@@ -203,7 +205,7 @@ class DisplayFilter:
         return [self._latest[key] for key in sorted(self._latest)]
 
     def clear(self) -> None:
-        """Start again, with an empty trace."""
+        """Restart with an empty trace."""
         self._trace.clear()
         self.passed.clear()
         self._latest.clear()

@@ -1,4 +1,4 @@
-"""The traffic of all buses: one row for each identifier, one for each bus.
+"""The traffic of all buses, with one row for each identifier, and one row for each bus.
 
 >>> traffic = Traffic()
 >>> traffic.take(Record(0, "can0", can.CanFrame.parse("705#7F")))
@@ -7,12 +7,12 @@
 >>> row.frames, row.gap_us, row.changed.latest == 0x7F ^ 0x05
 (2, 100000, True)
 
-The times between frames of one identifier.
+The module counts the times between frames of one identifier.
 
 >>> bucket_of(100), bucket_of(10_000), bucket_range(bucket_of(10_000))
 (100, 526, (9984, 10111))
 
-The bit rates of a bus, and the duration of a CAN FD frame at these rates.
+It also holds the bit rates of a bus, and the duration of a CAN FD frame at these rates.
 
 >>> frame = can.FdFrame.parse("123##1AABB")
 >>> BitRates(500_000, 2_000_000).bits(frame), BitRates().bits(frame)
@@ -31,14 +31,14 @@ from tickrig.wire import can
 
 SUB_BITS: Final = 6
 EXACT_US: Final = 1 << SUB_BITS + 1
-"""Times below it have a bucket each."""
+"""Time below which each time has a bucket of its own."""
 
 _KEPT: Final = 2_048
-"""Buckets whose middle need not be computed again: all there are below an hour."""
+"""Number of buckets whose middle is cached. They are all buckets below an hour."""
 
 
 def bucket_of(time_us: int) -> int:
-    """Return the bucket of a time, 0 or more."""
+    """Return the bucket of a time of 0 or more."""
     if time_us < EXACT_US:
         return time_us
     shift = time_us.bit_length() - SUB_BITS - 1
@@ -65,8 +65,8 @@ def quantile(counts: Mapping[int, int], per_mille: int) -> int:
     """Return the bucket that contains a quantile of the values.
 
     Args:
-        counts: number of values in each bucket; at least one value in total.
-        per_mille: the quantile in per mille, counted from the lowest value, 1 to 1000.
+        counts: number of values in each bucket. There is at least one value.
+        per_mille: quantile in per mille, counted from the lowest value, 1 to 1000.
     """
     rank = -(-sum(counts.values()) * per_mille // 1_000)
     for bucket in sorted(counts):
@@ -80,24 +80,25 @@ _MEDIAN: Final = 500
 _P99: Final = 990
 
 _NEAR_CYCLE: Final = 4
-"""A gap is near the cycle if it differs from it by no more than this part of it."""
+"""Divisor of the cycle. A gap near the cycle differs from it by at most this part."""
 
 _CYCLIC_PERCENT: Final = 75
-"""So many gaps must be near the cycle, else there is none."""
+"""Percentage of gaps that must be near the cycle. Otherwise there is no cycle."""
 
 
 class GapRow(NamedTuple):
     """Statistics of all gaps of one identifier.
 
     Attributes:
-        min_us: the shortest.
-        mean_us: the mean, rounded down.
-        p99_us: at most 1 % of the gaps were longer; the value is at most one part in 64 too long.
-        max_us: the longest.
-        jitter_us: mean difference between a gap and the previous one, rounded down.
-        cycle_us: cycle of the frames, including the missed ones; None unless three quarters of the
-            gaps are within a quarter of the median.
-        missed: upper limit of the number of missed frames of that cycle; None without a cycle.
+        min_us: shortest gap.
+        mean_us: mean of the gaps, rounded down.
+        p99_us: 99 % quantile. At most 1 % of the gaps were longer, and the value is at most one
+            part in 64 too long.
+        max_us: longest gap.
+        jitter_us: mean difference between a gap and the previous gap, rounded down.
+        cycle_us: cycle of the frames, including missed frames. It is None unless three quarters of
+            the gaps are within a quarter of the median.
+        missed: upper limit of the number of missed frames of that cycle, or None without a cycle.
     """
 
     min_us: int
@@ -110,14 +111,14 @@ class GapRow(NamedTuple):
 
 
 class Gaps:
-    """Counts gaps; its memory does not grow with their number.
+    """Counter of gaps. Its memory does not grow with the number of gaps.
 
     Attributes:
         count: number of gaps.
-        total_us: their sum.
-        min_us: the shortest.
-        max_us: the longest.
-        wander_us: sum of the differences between each gap and the previous one.
+        total_us: sum of the gaps.
+        min_us: shortest gap.
+        max_us: longest gap.
+        wander_us: sum of the differences between each gap and the previous gap.
         buckets: number of gaps in each bucket.
     """
 
@@ -144,7 +145,7 @@ class Gaps:
         self.buckets[bucket] = self.buckets.get(bucket, 0) + 1
 
     def row(self) -> GapRow | None:
-        """Return what they were; None before the first."""
+        """Return the statistics of the gaps, or None before the first gap."""
         if not self.count:
             return None
         p99_us = min(self.max_us, bucket_range(quantile(self.buckets, _P99))[1])
@@ -170,7 +171,7 @@ class Gaps:
         return cycle_us if cycle_us and near * 100 >= self.count * _CYCLIC_PERCENT else None
 
     def _missed(self, cycle_us: int) -> int:
-        """Count whole cycles in which nothing came: a gap of 1.5 to 2.5 cycles missed one."""
+        """Count whole cycles without a frame. A gap of 1.5 to 2.5 cycles missed one frame."""
         return sum(
             count * max(0, (2 * middle_us(bucket) + cycle_us) // (2 * cycle_us) - 1)
             for bucket, count in self.buckets.items()
@@ -189,7 +190,7 @@ class BitRow(NamedTuple):
     the bits continue to bit 511.
 
     Attributes:
-        latest: bits in which the latest payload differs from the previous one.
+        latest: bits in which the latest payload differs from the previous payload.
         planes: plane n holds bit n of the change count of each payload bit.
         notched: bits whose changes are known, and therefore not shown.
     """

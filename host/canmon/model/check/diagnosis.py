@@ -90,7 +90,7 @@ RULES: Final[Mapping[str, str]] = MappingProxyType(
         "max-load": "half a second with a load above 80 %",
     }
 )
-"""All rules, and what each finds."""
+"""Descriptions of all rules by name."""
 
 _MOST_LOAD: Final = 80.0
 _ANY_BUS: Final = frozenset(["no-error-frames", "time-back", "max-load"])
@@ -99,42 +99,42 @@ _TIMED: Final = (
     *(f"pdo-{what}" for what in ("period", "jitter", "missing", "doubled")),
     *(f"sync-{what}" for what in ("missing", "doubled", "period")),
 )
-"""Rules that a log without times cannot break."""
+"""Rules that a log without times cannot violate."""
 _SURE_SHARE: Final = 0.9
-"""Number of gaps from which the period of frames can be learnt."""
+"""Share of gaps with a period from which this period can be learnt."""
 _NEAR_US: Final = 100_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
-"""A heartbeat is lost after this many of its periods, as on the node board."""
+"""Number of periods after which a heartbeat is lost, as on the node board."""
 _MOST_STATES: Final = 64
-"""A statusword has no more values."""
+"""Number of values of a statusword above which an object is no statusword."""
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
 _STOPPED: Final = 5
 _STOPPED_US: Final = 250_000
-"""Frames stop if they miss this many periods, and this long, at the end of a log."""
+"""Duration without frames at the end of a log after which the frames count as stopped."""
 _SURE_FRAMES: Final = 50
 _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100
 _SOON_US: Final = 1_500_000
-"""What comes once within so long of a boot-up or NMT command belongs to the start."""
+"""Time after a boot-up or NMT command in which a single frame belongs to the start."""
 _NO_BUS: Final = "nothing was learnt of this bus"
 _NO_NODES: Final[Mapping[int, node_memory.EdsObjects]] = MappingProxyType({})
 
 
 class BusFault(NamedTuple):
-    """A fault on a bus: all findings of one rule about one node, or about one CAN-ID.
+    """A fault on a bus, with all findings of one rule about one node or one CAN-ID.
 
     Attributes:
-        rule: name of the rule, of `RULES`.
-        channel: the bus.
-        node: the node-ID; None if no node is to blame.
-        ident: the CAN-ID with flags, of the first occurrence; None for the bus as a whole.
-        text: what is wrong, in words.
+        rule: name of the rule in `RULES`.
+        channel: name of the bus.
+        node: node-ID of the responsible node, or None if no node is responsible.
+        ident: CAN-ID with flags of the first occurrence, or None for the bus as a whole.
+        text: description of the fault.
         first_us: time of the first occurrence.
         last_us: time of the last occurrence.
         amount: number of occurrences.
-        frames: the first thousand frames that show it.
+        frames: first thousand frames that show the fault.
     """
 
     rule: str
@@ -149,24 +149,24 @@ class BusFault(NamedTuple):
 
     @property
     def where(self) -> str:
-        """The bus, and the node or CAN-ID."""
+        """The bus, and the node or CAN-ID of the fault."""
         if self.node is not None:
             return f"{self.channel} node {self.node}"
         return self.channel if self.ident is None else f"{self.channel} {ident_text(self.ident)}"
 
     def __str__(self) -> str:
-        """Write rule, place and text."""
+        """Return rule, place and text of the fault."""
         where = f"{self.where}: " if self.where else ""
         return f"{self.rule}: {where}{self.text}"
 
 
 class Diagnosis(NamedTuple):
-    """The result: what was judged, and the faults.
+    """The result of a diagnosis: the rules that judged something, and the faults.
 
     Attributes:
-        faults: the faults, ordered by time.
-        judged: the rules that judged something.
-        unjudged: why each other rule judged nothing.
+        faults: faults in the order of time.
+        judged: names of the rules that judged something.
+        unjudged: reason why a rule judged nothing, by name of the rule.
         frames: number of frames.
     """
 
@@ -177,16 +177,16 @@ class Diagnosis(NamedTuple):
 
 
 class Diagnoser:
-    """Collects the frames of a source, and judges them when all have arrived.
+    """Collector of the frames of a source, which judges the frames when all have arrived.
 
     Args:
-        bit_rate: bits per second, for the load; None if unknown.
-        eds: contents of EDS files, by node-ID.
-        without_errors: why the source cannot contain error frames.
-        rules: rules learnt from a good log; None for no such rules.
+        bit_rate: bit rate in bits per second, used for the load. It is None if unknown.
+        eds: content of EDS files by node-ID.
+        without_errors: reason why the source cannot contain error frames.
+        rules: rules learnt from a good log, or None for no such rules.
 
     Attributes:
-        kept: the frames that arrived.
+        kept: frames that arrived.
     """
 
     def __init__(
@@ -201,7 +201,7 @@ class Diagnoser:
         self.kept = FrameKeeper()
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Take frames in the order of the log: a block of columns, or records."""
+        """Take frames in the order of the log, as a block of columns or as records."""
         self.kept.take(frames)
 
     def diagnosis(
@@ -212,7 +212,7 @@ class Diagnoser:
         Args:
             lost: losses that the source reports.
             errors: errors that the source reports besides error frames.
-            end_us: end of the traffic, in the time of the frames; 0 for the last frame.
+            end_us: end of the traffic, in the time of the frames. 0 stands for the last frame.
         """
         faults: list[BusFault] = []
         judged: set[str] = set()
@@ -243,7 +243,7 @@ class Diagnoser:
         return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
 
     def summaries(self) -> list[learnt.BusSummary]:
-        """Return what is usual on each bus."""
+        """Return the usual traffic on each bus."""
         found = []
         for bus in self.kept:
             one = _BusJudge(bus, self._bit_rate, self._eds)
@@ -260,9 +260,9 @@ def diagnose(
     """Judge the frames of a log by all rules that need no parameter.
 
     Args:
-        frames: blocks in the order of the log; each block is columns or records.
-        bit_rate: bits per second, for the load; None if unknown.
-        eds: contents of EDS files, by node-ID.
+        frames: blocks of frames in the order of the log. Each block is columns or records.
+        bit_rate: bit rate in bits per second, used for the load. It is None if unknown.
+        eds: content of EDS files by node-ID.
     """
     one = Diagnoser(bit_rate, eds)
     for block in frames:
@@ -271,7 +271,7 @@ def diagnose(
 
 
 class _BusJudge:
-    """Judges one bus."""
+    """Judge of one bus."""
 
     def __init__(
         self,
@@ -294,7 +294,7 @@ class _BusJudge:
         self._end_us = max(last_us, end_us)
 
     def faults(self) -> list[BusFault]:
-        """Return what is wrong."""
+        """Return the faults on the bus."""
         bus, rows = self._bus, self._rows
         self._time()
         self._load()
@@ -323,7 +323,7 @@ class _BusJudge:
         return self._grouped(events.hits)
 
     def _walk(self, but: Any) -> node_events.BusEvents:
-        """Look at the frames of services one by one; `but` is an array of rows to leave out."""
+        """Examine the frames of services one by one. `but` is an array of rows to leave out."""
         self._decoder = Decoder(self._eds)
         events = node_events.BusEvents(self._bus, self._times, self._decoder, self._rows)
         parts = [
@@ -336,7 +336,7 @@ class _BusJudge:
         return events
 
     def _polled(self) -> Any:
-        """Return the rows of SDO exchanges that tell no more than those beside them."""
+        """Return the rows of SDO exchanges that add no information to their neighbours."""
         bus = self._bus
         rows: Any = column_meanings.of_sdo(np.frombuffer(bus.ident, np.uint64))
         ident: Any = bus.picked(bus.ident, rows)
@@ -347,7 +347,7 @@ class _BusJudge:
         return rows[np.concatenate((found.requests[found.inner], found.answers[found.inner]))]
 
     def _without(self) -> dict[str, str]:
-        """Return why rules have nothing to judge."""
+        """Return the reasons why rules have nothing to judge."""
         heard, nodes = self._rows.keys(), self._events.nodes.values()
         have = {
             "pdo-": ("no PDO came", any(ident in node_events.PDO_IDS for ident in heard)),
@@ -469,7 +469,7 @@ class _BusJudge:
     def _pdo_length(
         self, ident: int, rows: Sequence[int], sizes: Counter[int], decoder: Decoder
     ) -> None:
-        """Find the frames of a PDO that have another length than most."""
+        """Find the frames of a PDO whose length differs from that of most frames."""
         usual = sizes.most_common(1)[0][0]
         layout = getattr(decoder.bus(self._bus.name).lasting(ident), "__self__", None)
         if isinstance(layout, PdoDecoder) and usual < layout.size:
@@ -523,7 +523,7 @@ class _BusJudge:
             self._hit("silence", None, text, [row, row + 1])
 
     def _silences(self) -> list[tuple[int, int, int]]:
-        """Return the times in which no frame at all came, where they are long, and their rows."""
+        """Return long times without any frame on the bus, and the rows before and after them."""
         times = self._times
         if len(times) < 2:
             return []
@@ -548,7 +548,7 @@ class _BusJudge:
         return {ident & node_events.NODE_MASK for ident in self._rows if ident <= STANDARD_MAX}
 
     def _pieces(self, ident: int, rows: Sequence[int]) -> list[Sequence[int]]:
-        """Cut the rows of an identifier where the rhythm of its frames changes on purpose."""
+        """Split the rows of an identifier where the rhythm of its frames changes on purpose."""
         times = _plain_times(self._times, rows)
         places = {bisect_right(times, cut) for cut in self._cuts_of(ident)}
         ends = sorted({0, len(rows), *places})
@@ -600,7 +600,7 @@ class _BusJudge:
                 self._hit(f"{kind}-missing", ident, text, [piece[-1]])
 
     def _is_silent(self, ident: int, begin: int, end: int, period: int) -> bool:
-        """Return whether the whole bus is silent in a gap, and record it."""
+        """Return whether the whole bus is silent in a gap. Record the silence."""
         at = bisect_left(self._quiet, (begin, 0, 0))
         for start, stop, row in self._quiet[max(0, at - 1) : at + 2]:
             inside = min(stop, end) - max(start, begin)
@@ -638,7 +638,7 @@ class _BusJudge:
     def _few_beats(
         self, node: int, times: Sequence[int]
     ) -> tuple[int | None, Sequence[tuple[int, int]]]:
-        """Return the period of heartbeats that are too few to learn it surely, and gaps above."""
+        """Return the period and longer gaps of heartbeats that are too few for a sure period."""
         gaps = sorted(b - a for a, b in pairwise(times))
         eds_ms = self._eds[node].heartbeat_ms if node in self._eds else 0
         period = eds_ms * 1_000 or (gaps[len(gaps) // 2] if len(gaps) >= 2 else 0)
@@ -662,7 +662,7 @@ class _BusJudge:
         self._hit("no-lost-heartbeat", ident, text, rows, n)
 
     def _two_beats(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
-        """Notice two heartbeats that go beside each other: each second one keeps the period."""
+        """Report two interleaved heartbeats, of which every second frame keeps the period."""
         found = node_memory.two_beats(times)
         if found is not None:
             self._double(ident, [rows[at + 1] for at in found.places])
@@ -675,7 +675,7 @@ class _BusJudge:
     # Drives, and what comes once
 
     def _drives(self, decoder: Decoder) -> int:
-        """Find the fault bit of statuswords: by the mapping, or in a TPDO1 that looks like one.
+        """Find the fault bit of statuswords, by the mapping or in a similar TPDO1.
 
         Returns:
             The number of PDOs with a statusword.
@@ -700,7 +700,7 @@ class _BusJudge:
         return drives
 
     def _statusword(self, ident: int, rows: Sequence[int], shift: int | None) -> bool:
-        """Judge a statusword; return whether it is one."""
+        """Judge a statusword. Return whether the object is a statusword."""
         payload = self._bus.picked(self._bus.payload, rows)
         low, runs = shift or 0, []
         if isinstance(payload, list):
@@ -726,7 +726,10 @@ class _BusJudge:
         return True
 
     def _is_statusword(self, ident: int, rows: Sequence[int], values: Sequence[int]) -> bool:
-        """Return whether TPDO1 begins with a statusword: all values are states, one enabled."""
+        """Return whether TPDO1 begins with a statusword.
+
+        All values are states, and one state is enabled.
+        """
         if any(self._bus.dlc[row] < 2 for row in rows[: learnt.KEPT_FRAMES]):
             return False
         if len(set(values)) > _MOST_STATES:
@@ -739,7 +742,7 @@ class _BusJudge:
         return states <= usual and bool(running) and 0 not in running
 
     def _once(self) -> None:
-        """Find identifiers that came once, and that nothing explains."""
+        """Find identifiers with a single frame that no known event explains."""
         times = self._times
         if not self._is_long():
             return
@@ -769,7 +772,7 @@ class _BusJudge:
     # What is usual
 
     def summary(self) -> learnt.BusSummary:
-        """Return what is usual, once `faults` was called."""
+        """Return the usual traffic on the bus, after `faults` was called."""
         bus, frames = self._bus, {}
         sync = self._rhythm_of(node_events.SYNC_ID)
         for ident, rows in self._rows.items():
@@ -797,7 +800,7 @@ class _BusJudge:
         )
 
     def _longest(self, ident: int) -> Sequence[int]:
-        """Return the longest run of frames of an identifier without a cut."""
+        """Return the longest series of frames of an identifier without a change of the rhythm."""
         return max(self._pieces(ident, self._rows.get(ident, [])), key=len, default=[])
 
     def _rhythm_of(self, ident: int) -> cycles.Rhythm | None:
@@ -818,7 +821,10 @@ class _BusJudge:
         return nodes
 
     def _boot_order(self, boots: Mapping[int, int]) -> list[list[int]]:
-        """Return the nodes in the order of their boot-ups; those that are near are together."""
+        """Return the nodes in the order of their boot-ups.
+
+        Nodes that boot at nearly one time are a group.
+        """
         groups: list[list[int]] = []
         latest_us = None
         for node, row in sorted(boots.items(), key=lambda item: item[1]):
@@ -828,9 +834,13 @@ class _BusJudge:
         return [sorted(group) for group in groups]
 
     def _peak(self) -> tuple[int, tuple[int, int]]:
-        """Return bits per second of the busiest half second, and the ends of one with a high load.
+        """Return bits per second of the busiest half second, and the rows of a half second.
 
-        These are the ends of the first half second above the limit, or else of the busiest one.
+        These rows are the ends of the first half second above the limit, or else of the busiest
+        one.
+
+        These rows are the ends of the first half second above the limit, or else of the busiest
+        one.
         """
         first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
         steps = self._bits_by_step(first_us)
@@ -845,7 +855,7 @@ class _BusJudge:
         return sums.get(busiest, 0) * 1_000_000 // _LOAD_US, (begin, max(begin, end - 1))
 
     def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
-        """Put hits of one rule and node, or CAN-ID, together."""
+        """Combine the hits of one rule about one node or CAN-ID."""
         self._hits += hits
         if self._rules is not None:
             self.judged |= learnt.RULES.keys()
@@ -898,7 +908,7 @@ def _counted(values: Any) -> Counter[int]:
 
 
 def _plain(values: Any) -> list[int]:
-    """Return a list of integers of Python."""
+    """Return the values as a list of Python integers."""
     if isinstance(values, list):
         return values
     found: list[int] = values.tolist() if hasattr(values, "tolist") else list(values)
@@ -910,7 +920,7 @@ def _plain_times(times: Sequence[int], rows: Sequence[int]) -> _TimesOf:
 
 
 class _TimesOf(Sequence[int]):
-    """The times of some rows, looked up when they are asked for."""
+    """The times of some rows, which are looked up when needed."""
 
     def __init__(self, times: Sequence[int], rows: Sequence[int]) -> None:
         self._times, self._rows = times, rows

@@ -1,4 +1,4 @@
-"""Filters: which frames are wanted.
+"""Filters that select the wanted frames.
 
 ```
 filter = list | or              list: candump's rules, as 123:7FF,400~700,#FF
@@ -24,7 +24,7 @@ Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python, or
 >>> parse_filter("node=5 and (pdo or emcy)").matches(record, Decoded("emcy", 5))
 True
 
-The words of filters and rules, with where they stand.
+The tokens are the words of filters and rules, with their columns.
 
 >>> [token.text for token in tokens_of("x>=-1.5 in {-2..8130h} ±10%")]
 ['x', '>=', '-1.5', 'in', '{', '-2', '..', '8130h', '}', '±', '10%', '']
@@ -102,11 +102,11 @@ _RANGES: Final = {
     "dlc": range(16),
     "bytes": range(MAX_FD_BYTES + 1),
 }
-"""What the numbers of `_FIELDS` can be."""
+"""Possible values of the numbers in `_FIELDS`."""
 KNOWN_WORDS: Final = {"kind": (*KINDS, "fd"), "dir": ("rx", "tx"), "src": (EDS, SEEN, DBC)}
-"""What the words of `_WORDS` can be, beside PDOs by their numbers."""
+"""Possible words of `_WORDS`, in addition to PDOs by their numbers."""
 _FREE: Final = ("kind", "src")
-"""Decoders of installed packages may say others."""
+"""Fields in which decoders of installed packages may use other words."""
 _ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
 NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
 
@@ -118,7 +118,7 @@ _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 
 
 def _kind_test(word: str) -> Test | None:
-    """Return the test for a kind of frame, or for how an SDO transfer ended."""
+    """Return the test for a kind of frame, or for the outcome of an SDO transfer."""
     if word in _FD_KINDS:
         test = _FD_KINDS[word]
         return lambda record, decoded: isinstance(record.frame, FdFrame) and test(record.frame)
@@ -140,12 +140,12 @@ def _kind_test(word: str) -> Test | None:
 
 
 def _state_path(node: int) -> str:
-    """Return the name under which a filter waits for the NMT state of a node."""
+    """Return the name that a filter uses for the NMT state of a node."""
     return f"state of node {node}"
 
 
 def _state_test(nodes: range, state: int) -> Test:
-    """Return the test for nodes that tell an NMT state."""
+    """Return the test for nodes with a known NMT state."""
     return lambda record, decoded: (
         decoded.node in nodes
         and decoded.kind in _ERROR_CONTROL
@@ -164,7 +164,7 @@ def _object_test(index: int, sub: int | None) -> Test:
 
 
 def _range_test(low: int, high: int, *, extended: bool) -> Test:
-    """Return the test for CAN-IDs, both ends included."""
+    """Return the test for CAN-IDs in a range that includes both ends."""
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
         frame = record.frame
@@ -188,7 +188,7 @@ def _candump_test(chosen: CandumpFilter) -> Test:
 
 
 def _never_holds(name: str, sign: str, value: float) -> bool:
-    """Return whether a field can never match this comparison: it must be a mistake."""
+    """Return whether a field can never match a comparison, so that the comparison is a mistake."""
     numbers, compare = _RANGES[name], COMPARISONS[sign]
     if sign in _EQUALITIES:
         return value not in numbers
@@ -202,7 +202,7 @@ def _is_word(name: str, value: str) -> bool:
 
 
 def _field_test(name: str, compare: _Compare, value: float) -> Test:
-    """Return the test for a number that every frame of some kind has."""
+    """Return the test for a number that every frame of a kind has."""
     field = _FIELDS[name]
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
@@ -219,13 +219,15 @@ def _word_test(name: str, sign: str, value: str) -> Test:
 
 
 def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
-    """Return the test for a signal or one of its bits; without a comparison it must not be 0.
+    """Return the test for a signal or a bit of a signal.
+
+    Without a comparison, the signal must not be 0.
 
     Args:
         path: name of the signal, optionally with `node.` before it, and `.` with the name or number
             of a bit after it.
-        sign: one of `COMPARISONS`.
-        text: the value to compare with.
+        sign: comparison operator, one of `COMPARISONS`.
+        text: value to compare with.
     """
     find, compare = signal_reader(path), comparison(sign, text)
 
@@ -242,7 +244,7 @@ def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
     The function returns None if the frame does not contain the signal.
 
     Args:
-        path: see `signal_test`.
+        path: name of the signal, as for `signal_test`.
     """
     if match := _STATE.fullmatch(path):
         return _state_reader(int(match[1]))
@@ -272,7 +274,7 @@ def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
 
 
 def signal_place(path: str) -> tuple[int | None, str, int | None]:
-    """Return node, name and bit of a signal in a filter; None for a node or bit not named.
+    """Return node, name and bit of a signal in a filter, with None for a node or bit not named.
 
     >>> signal_place("3.statusword.fault"), signal_place("position")
     ((3, 'statusword', 3), (None, 'position', None))
@@ -285,7 +287,7 @@ def signal_place(path: str) -> tuple[int | None, str, int | None]:
 
 
 def number(text: str) -> float | None:
-    """Parse a number in any notation; None if it is not a number.
+    """Parse a number in any notation. Return None if the text is not a number.
 
     >>> number("0x10"), number("-1.5"), number("8130h"), number("fast")
     (16, -1.5, 33072, None)
@@ -311,8 +313,9 @@ def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
     """Return a function that compares a signal, by its number or its text.
 
     Args:
-        sign: one of `COMPARISONS`; one of `_EQUALITIES` if the text is not a number.
-        text: the value to compare with.
+        sign: comparison operator from `COMPARISONS`, or from `_EQUALITIES` if the text is not a
+            number.
+        text: value to compare with.
     """
     wanted, compare = number(text), COMPARISONS[sign]
     if wanted is None:
@@ -327,7 +330,7 @@ def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
 
 
 def _bit(signal: Signal, shift: int) -> Signal:
-    """Return one bit of a signal; nothing comparable where it is no number."""
+    """Return one bit of a signal. If the signal is not a number, the result equals no value."""
     value = signal.value
     return Signal(signal.name, value >> shift & 1 if isinstance(value, int) else "")
 
@@ -337,11 +340,11 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Waits for signals by name, and for words that no built-in decoder produces.
+    """Signals, and words that no built-in decoder produces, that have not occurred yet.
 
     Args:
         paths: names of signals as in filters: `position`, `3.position`, `statusword.fault`.
-        words: field and word, as in `Filter.words`.
+        words: fields and words as in `Filter.words`.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -349,11 +352,11 @@ class MissingSignals:
         self._words = sorted(words)
 
     def __bool__(self) -> bool:
-        """Return whether any is missing."""
+        """Return whether any signal or word is missing."""
         return bool(self._left or self._words)
 
     def take(self, record: AnyRecord, decoded: Decoded) -> None:
-        """Take what a frame says."""
+        """Take the decoded content of a frame."""
         if decoded.signals:
             left = self._left.items()
             self._left = {path: find for path, find in left if find(decoded) is None}
@@ -364,16 +367,16 @@ class MissingSignals:
 
     @property
     def paths(self) -> list[str]:
-        """Those that have not come."""
+        """The signals that have not occurred."""
         return list(self._left)
 
     @property
     def words(self) -> list[str]:
-        """Those that have not come, as `kind=word`."""
+        """The words that have not occurred, as `kind=word`."""
         return [f"{name}={word}" for name, word in self._words]
 
     def messages(self) -> list[str]:
-        """Report what never came, one line each."""
+        """Report the signals and words that never occurred, one per line."""
         known = (*_FIELDS, *_WORDS, *KINDS)
         signals = [
             f"the filter asks for {path!r}: no such signal came"
@@ -393,14 +396,14 @@ _TOKEN: Final = re.compile(
 
 
 class Token(NamedTuple):
-    """A word or a sign, and its column from 1."""
+    """A word or a sign with its column, which counts from 1."""
 
     text: str
     column: int
 
 
 def tokens_of(text: str) -> list[Token]:
-    """Take a text apart; the last token is empty."""
+    """Split a text into tokens. The last token is empty."""
     tokens = []
     at, end = 0, len(text.rstrip())
     while at < end:
@@ -412,20 +415,20 @@ def tokens_of(text: str) -> list[Token]:
 
 
 _LONGEST: Final = 10_000
-"""Characters of a filter or a rule."""
+"""Maximum number of characters of a filter or a rule."""
 
 _DEEPEST: Final = 50
-"""So many brackets and `not` may stand in each other."""
+"""Maximum depth of nested brackets and `not`."""
 
 _SHOWN: Final = 200
 
 
 class FilterError(ValueError):
-    """Text that is no filter.
+    """A text that is not a filter.
 
     Attributes:
-        what: it should be.
-        column: where, from 1.
+        what: description of what the text should be.
+        column: column of the error, from 1.
     """
 
     what = "filter"
@@ -449,10 +452,10 @@ _ALIASES: Final = {"bootup": "boot-up", "ch": "channel"}
 
 
 class FilterParser:
-    """Recursive descent over the grammar in `filter`, one method a rule.
+    """Recursive descent parser for the grammar in `filter`, with one method per rule.
 
     Args:
-        text: the filter.
+        text: text of the filter.
     """
 
     wrong = FilterError
@@ -467,7 +470,7 @@ class FilterParser:
         self._tokens, self._depth = tokens_of(text), 0
 
     def parse(self) -> Filter:
-        """Read the filter; FilterError if it is none."""
+        """Read the filter. Raise FilterError if the text is not a filter."""
         test = self._or()
         if self._next.text:
             raise self._error(f"{self._next.text!r} after the end; join terms by 'and' or 'or'")
@@ -475,7 +478,7 @@ class FilterParser:
 
     @property
     def words(self) -> frozenset[tuple[str, str]]:
-        """Words that were read and that no decoder of ours says, as `Filter.words`."""
+        """Words that were read and that no built-in decoder produces, as in `Filter.words`."""
         return frozenset(self._words)
 
     @property
@@ -483,7 +486,7 @@ class FilterParser:
         return self._tokens[0]
 
     def _take(self, *words: str) -> bool:
-        """Take the next token if it is one of these."""
+        """Read the next token if it is one of these."""
         if self._next.text not in words:
             return False
         del self._tokens[0]
@@ -539,7 +542,7 @@ class FilterParser:
         return lambda record, decoded: decoded.node in nodes and test(record, decoded)
 
     def _node_ids(self) -> range:
-        """Take node-IDs, as 3 or 3-5."""
+        """Read node-IDs such as 3 or 3-5."""
         match = _NODES.fullmatch(self._next.text)
         nodes = range(int(match[1]), int(match[2] or match[1]) + 1) if match else range(0)
         if not nodes or nodes[0] < 1 or nodes[-1] > _HIGHEST_NODE:
@@ -551,7 +554,7 @@ class FilterParser:
         return nodes
 
     def _node(self) -> Test:
-        """Take what stands behind `node`: node-IDs, and an NMT state where there is one."""
+        """Read the text after `node`, which is node-IDs, and an NMT state if there is one."""
         nodes, word = self._node_ids(), self._next.text
         if word not in NMT_STATES:
             return lambda record, decoded: decoded.node in nodes
@@ -579,7 +582,7 @@ class FilterParser:
         return test
 
     def _id_test(self, word: str) -> Test | None:
-        """Return the test of CAN-IDs; None for other words."""
+        """Return the test of CAN-IDs, or None for other words."""
         if _RULE.fullmatch(word):
             return _candump_test(CandumpFilter.parse(word))
         if errors := _ERRORS.fullmatch(word):
@@ -628,7 +631,7 @@ class FilterParser:
         return _field_test(name, COMPARISONS[sign], wanted)
 
     def _comparison(self, name: str) -> tuple[str, str]:
-        """Take the sign; return it and the value behind it, which is not taken yet."""
+        """Read the sign. Return it with the value after it, which is not consumed yet."""
         sign = self._next.text
         if sign not in COMPARISONS:
             raise self._error(f"{name} is compared by one of {' '.join(COMPARISONS)}")
@@ -664,9 +667,9 @@ class Filter:
     """A parsed filter.
 
     Attributes:
-        text: as written.
-        matches: returns whether a frame passes.
-        signals: names of its signals, to report those that never occur.
+        text: text of the filter.
+        matches: function that returns whether a frame passes.
+        signals: names of the signals in the filter, used to report signals that never occur.
         words: field and word for each word that only a decoder of an installed package can produce.
     """
 
@@ -680,7 +683,7 @@ def parse_filter(text: str) -> Filter:
     """Read a filter.
 
     Raises:
-        FilterError: it is none; says the column.
+        FilterError: the text is not a filter. The message contains the column.
     """
     try:
         chosen = CandumpFilter.parse(text)

@@ -1,6 +1,6 @@
 """The state of all nodes, as rows, as text and as JSON, and a card of each node.
 
-The known identity of a node, and the known contents of its PDOs.
+The module also describes the known identity of a node, and the known contents of its PDOs.
 
 >>> from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory
 >>> values = {(0x1000, 0): 0x20192, (0x1018, 1): 0x13F, (0x1018, 3): 0x10002, (0x1A00, 0): 1}
@@ -66,7 +66,7 @@ _TARGETS: Final = {
 
 
 class _EmcyRecord(NamedTuple):
-    """An EMCY and when it came."""
+    """An EMCY with its time."""
 
     at_us: int
     code: int
@@ -78,27 +78,27 @@ class NodeStatus:
     """One row of the node board.
 
     Args:
-        channel: its bus.
-        node: its node-ID.
-        memory: the known objects of the node.
+        channel: name of the node's bus.
+        node: node-ID of the node.
+        memory: known objects of the node.
 
     Attributes:
-        state: last reported NMT state, None before the first.
-        commanded: the state that the NMT master has commanded since; None after the node has
+        state: last reported NMT state, or None before the first report.
+        commanded: state that the NMT master has commanded since, or None after the node has
             reported its state.
         boots: number of boot-up messages.
         unrequested_boots: number of boot-ups without an NMT command that follow an earlier frame of
             the node.
         late: gaps between heartbeats that were longer than `LATE` periods.
-        emcys: the latest, oldest first.
-        emcy_count: number of all EMCYs.
-        error_code: error code of the latest EMCY; 0 if it cleared an error.
+        emcys: latest EMCY messages. The oldest is first.
+        emcy_count: number of all EMCY messages.
+        error_code: error code of the latest EMCY, or 0 if it cleared an error.
         sdo_errors: number of transfers that were aborted, unanswered or incomplete.
-        sdo_error: the last of these transfers, in words.
-        drive_state: state of CiA 402; empty before the first statusword.
-        name: the device name that it reported.
-        present: whether it has sent a frame that is known to be its own.
-        pdos: the latest frame of each of its PDOs, by kind.
+        sdo_error: last of these transfers, in words.
+        drive_state: state of CiA 402, empty before the first statusword.
+        name: device name that the node reported.
+        present: whether the node has sent a frame that is known to be its own.
+        pdos: latest frame of each PDO of the node, by kind.
         doubled: whether two nodes have this node-ID, according to heartbeats and boot-ups. The row
             then mixes both nodes, and the gaps do not give a period.
     """
@@ -129,17 +129,17 @@ class NodeStatus:
     _booted_us: int | None = None
 
     def __post_init__(self) -> None:
-        """Wait for its first heartbeat."""
+        """Prepare for the first heartbeat."""
         self._heartbeats = Heartbeats(self.memory)
 
     @property
     def known_name(self) -> str:
-        """Its name: as it says, else as its file does."""
+        """Name that the node reported, or else the name in its EDS file."""
         return self.name or self.memory.eds.name
 
     @property
     def period_us(self) -> int | None:
-        """The heartbeat period, as `Heartbeats` knows it; None for none."""
+        """The heartbeat period as known to `Heartbeats`, or None without a period."""
         return self._heartbeats.period_us
 
     @property
@@ -149,11 +149,11 @@ class NodeStatus:
 
     @property
     def reported_us(self) -> int | None:
-        """Time of its last reported state."""
+        """Time of the last reported state."""
         return self._heartbeats.last_us
 
     def age_us(self, now_us: int) -> int | None:
-        """Return the time since its last reported state."""
+        """Return the time since the last reported state."""
         return None if self.reported_us is None else now_us - self.reported_us
 
     def is_late(self, now_us: int) -> bool:
@@ -164,20 +164,20 @@ class NodeStatus:
 
     @property
     def state_text(self) -> str:
-        """The NMT state as text; if the master commanded another one since, after an arrow."""
+        """The NMT state as text. A later commanded state of the master follows after an arrow."""
         told = "?" if self.state is None else nmt_state_name(self.state)
         if self.commanded in (None, self.state):
             return told
         return f"{told} -> {nmt_state_name(self.commanded or 0)}"
 
     def command(self, specifier: int) -> None:
-        """Take an NMT command to this node."""
+        """Process an NMT command to the node."""
         target = _TARGETS[NmtCommand(specifier)]
         self.commanded = target
         self._reset_requested = target is NmtState.INITIALISING
 
     def boot(self, at_us: int) -> None:
-        """Take its boot-up: it is pre-operational then (CiA 301, boot-up)."""
+        """Process a boot-up. The node is then pre-operational (CiA 301, boot-up)."""
         self.boots += 1
         if self._booted_us is not None and not self._reset_requested:
             self.doubled |= 0 <= at_us - self._booted_us <= PAIR_US
@@ -190,14 +190,14 @@ class NodeStatus:
         self._report(NmtState.PRE_OPERATIONAL)
 
     def heartbeat(self, at_us: int, state: int) -> None:
-        """Take a heartbeat, or the answer to a guarding request."""
+        """Process a heartbeat, or the answer to a guarding request."""
         self.late += self.is_late(at_us)
         self._heartbeats.take(at_us)
         self._count_heartbeat(at_us)
         self._report(state)
 
     def _count_heartbeat(self, at_us: int) -> None:
-        """Notice a second heartbeat beside the first, and when there is none any more."""
+        """Detect a second heartbeat beside the first, and its end."""
         self._beats_us.append(at_us)
         gaps = [b - a for a, b in pairwise(list(self._beats_us)[-3:])]
         alike = len(gaps) < 2 or abs(gaps[1] - gaps[0]) <= 0.2 * max(map(abs, gaps))
@@ -212,7 +212,7 @@ class NodeStatus:
         self.state, self.commanded, self.present = state, None, True
 
     def emcy(self, at_us: int, decoded: Decoded) -> None:
-        """Take an EMCY."""
+        """Process an EMCY."""
         self.present = True
         if not decoded.signals:
             return
@@ -223,7 +223,7 @@ class NodeStatus:
         self.emcys.append(_EmcyRecord(at_us, code, decoded.text))
 
     def transfer(self, at_us: int, transfer: Transfer) -> None:
-        """Take an SDO transfer that ended."""
+        """Process an SDO transfer that ended."""
         self.present = self.present or transfer.outcome.answered
         if transfer.outcome is not TransferOutcome.DONE:
             self.sdo_errors += 1
@@ -239,7 +239,7 @@ _ERROR_CONTROL: Final = ("heartbeat", "guard")
 
 
 class NodeBoard:
-    """Keeps the status of every node that sends.
+    """The status of every node that sends frames.
 
     A node is on the board from its first reported state, EMCY or answer to an SDO request. It is
     also on the board from its first PDO, if the PDO is known to be its own, or has a CAN-ID of the
@@ -247,8 +247,8 @@ class NodeBoard:
     beginning.
 
     Args:
-        decoder: decodes the frames that the board processes.
-        expected: nodes with an EDS; they belong to the first bus with a frame.
+        decoder: decoder of the frames that the board processes.
+        expected: nodes with an EDS, which belong to the first bus with a frame.
     """
 
     def __init__(self, decoder: Decoder, expected: Mapping[int, str] | None = None) -> None:
@@ -262,11 +262,11 @@ class NodeBoard:
         return [self._nodes[key] for key in sorted(self._nodes)]
 
     def row(self, channel: str, node: int) -> NodeStatus | None:
-        """Return a node; None if it is not on the board."""
+        """Return a node, or None if the node is not on the board."""
         return self._nodes.get((channel, node))
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Take a decoded frame."""
+        """Process a decoded frame."""
         self.now_us = max(self.now_us, record.at_us)
         if self._expected:
             self._expect(record.channel)
@@ -338,18 +338,18 @@ _VERSION: Final = 1
 _GAP: Final = "  "
 _BAR_CELLS: Final = 5
 FROM_TWO_NODES: Final = "from two nodes"
-"""Stands for a heartbeat period, where two nodes have one node-ID."""
+"""Text in place of a heartbeat period if two nodes have one node-ID."""
 _HEADS: Final = ("NODE", "NAME", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", "EMCY", "SDO ERROR")
 
 
 def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list[str]:
-    """Return the board as lines: a table, and below it the latest EMCYs.
+    """Return the board as lines, with a table and the latest EMCYs below it.
 
     Args:
-        board: the board.
-        now_us: the time to which ages refer.
-        width: columns of the terminal.
-        height: lines that may be used.
+        board: board with the nodes.
+        now_us: time to which ages refer.
+        width: number of columns of the terminal.
+        height: number of lines that may be used.
     """
     rows = board.rows()
     several = len({row.channel for row in rows}) > 1
@@ -364,7 +364,7 @@ def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list
 
 
 def board_json(board: NodeBoard, now_us: int) -> list[str]:
-    """Return one JSON object a node."""
+    """Return one JSON object per node."""
     return [json_text(_fields(row, now_us)) for row in board.rows()]
 
 
@@ -387,7 +387,7 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
 
 
 def _heartbeat(row: NodeStatus, now_us: int) -> str:
-    """Write age, period, and how much of one and a half periods has gone."""
+    """Return age, period, and the elapsed part of one and a half periods as text."""
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
         return "never seen" if row.period_us else ""
@@ -414,14 +414,14 @@ def _emcy(row: NodeStatus) -> str:
 def emcy_history(
     rows: Sequence[NodeStatus], stamp: Stamp = Stamp.ABSOLUTE, origin_us: int = 0
 ) -> list[str]:
-    """Return an empty line, a head, and the EMCYs of all nodes, the latest first.
+    """Return an empty line, a head, and the EMCYs of all nodes. The latest EMCY is first.
 
-    Without EMCYs it returns nothing.
+    Without EMCYs, the function returns no lines.
 
     Args:
-        rows: the nodes.
+        rows: nodes with their EMCYs.
         stamp: format of times.
-        origin_us: the time of the first frame.
+        origin_us: time of the first frame.
     """
     found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
     before = [origin_us, *(at_us for at_us, _, _ in found)]
@@ -467,14 +467,14 @@ _PROFILES: Final = {401: "I/O", 402: "drive", 405: "PLC", 406: "encoder", 410: "
 
 
 class _PdoContent(NamedTuple):
-    """A PDO that has a CAN-ID.
+    """The content of a PDO that has a CAN-ID.
 
     Attributes:
-        kind: as in `Decoded`.
-        can_id: its own.
-        receives: whether the node receives it.
-        names: of the objects in it; empty if the mapping is unknown.
-        text: these names with their source, and with their latest values if the PDO was sent.
+        kind: kind as in `Decoded`.
+        can_id: CAN-ID of the PDO.
+        receives: whether the node receives the PDO.
+        names: names of the objects in the PDO, empty if the mapping is unknown.
+        text: names with their source, and with their latest values if the PDO was sent.
     """
 
     kind: str
@@ -485,7 +485,7 @@ class _PdoContent(NamedTuple):
 
 
 def pdo_contents(row: NodeStatus) -> list[_PdoContent]:
-    """Return the PDOs of a node that are known, those that it sends first."""
+    """Return the known PDOs of a node. The PDOs that the node sends come first."""
     return list(_pdos(row))
 
 
@@ -509,14 +509,14 @@ def _pdos(row: NodeStatus) -> Iterator[_PdoContent]:
 
 
 def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:
-    """Return the names of what is mapped; what is left out goes by."""
+    """Return the names of the mapped objects, without gaps that carry no object."""
     mapped = mapped_objects(memory, mapping, count)
     entries = [(item.index, item.sub) for item in mapped if item.index not in DUMMIES]
     return tuple(memory.describe(*entry).name or write_entry(entry) for entry in entries)
 
 
 def maker_text(row: NodeStatus) -> str:
-    """Return vendor and product in short: names where a file has them, else numbers."""
+    """Return vendor and product in short, as names if a file has them, or else as numbers."""
     vendor, product = row.memory.number(_IDENTITY, 1), row.memory.number(_IDENTITY, 2)
     words = [row.memory.eds.vendor or ("" if not vendor else f"{vendor:08X}h")]
     words += [f"{product:08X}h"] if product else []
@@ -526,7 +526,7 @@ def maker_text(row: NodeStatus) -> str:
 
 
 def name_text(row: NodeStatus) -> str:
-    """Return the name of a node, marked where its EDS says it, and not the node."""
+    """Return the name of a node, with a mark if the name is from the EDS and not from the node."""
     name, told = row.known_name, row.memory.was_received(_DEVICE_NAME)
     return name + _FROM_EDS * bool(name and not told)
 

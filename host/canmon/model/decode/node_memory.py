@@ -51,7 +51,7 @@ _CONTROLWORD_BITS: Final = {
     "halt": 8,
 }
 BITS: Final = {"statusword": _STATUSWORD_BITS, "controlword": _CONTROLWORD_BITS}
-"""Bits by name, of the objects whose bits have names."""
+"""Names of bits by object, for objects whose bits have names."""
 
 
 _BY_BITS: Final = tuple(
@@ -60,7 +60,7 @@ _BY_BITS: Final = tuple(
 
 
 def drive_state(statusword: int) -> str:
-    """Return the state; empty for bits that are none."""
+    """Return the state of a drive, empty for bits that are not a state."""
     return _BY_BITS[statusword & 0x7F]
 
 
@@ -73,12 +73,12 @@ class ObjectText(NamedTuple):
     """The description of an object.
 
     Attributes:
-        name: as in `Signal.name`.
-        kind: its data type, None if unknown.
-        unit: its unit, empty if unknown.
-        factor: factor that converts the number to this unit.
-        source: as in `Decoded.source`.
-        in_hex: whether to write the value in hex: it is a set of bits, or an identifier.
+        name: name as in `Signal.name`.
+        kind: data type of the object, or None if unknown.
+        unit: unit of the object, empty if unknown.
+        factor: factor that converts the number to the unit.
+        source: source as in `Decoded.source`.
+        in_hex: whether to write the value in hex, because it is a set of bits or an identifier.
     """
 
     name: str = ""
@@ -92,9 +92,9 @@ class ObjectText(NamedTuple):
         """Return the bytes of the value, without surplus bytes of the SDO transfer.
 
         Args:
-            data: the bytes in the transfer.
-            sized: whether the transfer indicated their number. If not, surplus bytes have no
-                meaning. If so, they are dropped only if they are padding.
+            data: bytes in the transfer.
+            sized: whether the transfer indicated the number of bytes. If not, surplus bytes have no
+                meaning. If so, surplus bytes are dropped only if they are padding.
         """
         size = 0 if self.kind is None else self.kind.size
         if not 0 < size < len(data):
@@ -105,7 +105,7 @@ class ObjectText(NamedTuple):
         return value if filled or not sized else data
 
     def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
-        """Return value and text of some bytes, after `fitted`.
+        """Return value and text of some bytes, after a call of `fitted`.
 
         The data type is ignored if the bytes do not fit it.
         """
@@ -138,7 +138,7 @@ def _number(data: bytes) -> tuple[Value, str]:
 
 
 def slug(name: str) -> str:
-    """Return a name as filters write it.
+    """Return a name in the notation of filters.
 
     >>> slug("Velocity actual value"), slug("COB-ID used by PDO")
     ('velocity_actual_value', 'cob_id_used_by_pdo')
@@ -147,7 +147,7 @@ def slug(name: str) -> str:
 
 
 def write_bytes(data: bytes) -> str:
-    r"""Write some bytes: as text where they are text.
+    r"""Return some bytes as text, or in hex if they are not text.
 
     >>> write_bytes(b"EPOS"), write_bytes(b"\x01\xff")
     ("'EPOS'", '01 FF')
@@ -192,7 +192,7 @@ _IN_HEX: Final = {
 
 
 def describe_standard(index: int, sub: int) -> ObjectText | None:
-    """Return what CiA 301 says of an object; None if it says nothing.
+    """Return the description of an object in CiA 301, or None if there is none.
 
     >>> describe_standard(0x1801, 5).name, describe_standard(0x6041, 0)
     ('tpdo2.event_timer', None)
@@ -217,7 +217,7 @@ def describe_standard(index: int, sub: int) -> ObjectText | None:
 
 
 def describe_drive(index: int, sub: int) -> ObjectText | None:
-    """Return what CiA 402 says of an object of a drive with one axis; None for others."""
+    """Return the description of an object in CiA 402 for a drive with one axis, or None."""
     is_known = index >= _PROFILES and index in _VARIABLES and sub == 0
     return _standard_text(*_VARIABLES[index]) if is_known else None
 
@@ -237,14 +237,14 @@ def _standard_text(name: str, kind: DataType) -> ObjectText:
 
 @dataclass(frozen=True, slots=True)
 class EdsObjects:
-    """The content of a file for a node.
+    """The content of an EDS file for a node.
 
     Attributes:
-        texts: name, type and unit by index and sub-index.
+        texts: name, type and unit of each object, by index and sub-index.
         values: power-on values as bytes on the wire, by index and sub-index.
-        name: name of the device; empty if the file has none.
-        findings: errors in the file; objects with errors are not used.
-        vendor: name of the vendor; empty if the file has none.
+        name: name of the device, empty if the file has none.
+        findings: errors in the file. Objects with errors are not used.
+        vendor: name of the vendor, empty if the file has none.
     """
 
     texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
@@ -255,7 +255,7 @@ class EdsObjects:
 
     @property
     def heartbeat_ms(self) -> int:
-        """What it says of 1017h; 0 where it says nothing."""
+        """Value of 1017h in the file, or 0 without a value."""
         return int.from_bytes(self.values.get(HEARTBEAT_TIME, b""), "little")
 
 
@@ -264,7 +264,7 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it has no usable object.
+        EdsError: the file has no usable object.
     """
     device, findings = read_sound(path)
     return eds_objects(device, node_id, path.stem, findings)
@@ -273,7 +273,7 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
 def eds_objects(
     device: EdsDevice, node_id: int, name: str, findings: tuple[Finding, ...] = ()
 ) -> EdsObjects:
-    """Return what the device of an EDS says of a node; `name` is for one that has none."""
+    """Return the content of an EDS for a node. `name` is used for a device without a name."""
     return EdsObjects(
         {(row.index, row.sub): _text(device, row) for row in device.entries},
         {
@@ -305,7 +305,7 @@ _DRIVE_PROFILE: Final = 402
 _SEVERAL_PROFILES: Final = 0xFFFF
 _DRIVE_WORDS: Final = (0x6040, 0x6041)
 _COMMUNICATION: Final = range(0x1000, 0x2000)
-"""Objects that say how the others travel."""
+"""Objects that determine how other objects are transferred."""
 
 Entry = tuple[int, int]
 
@@ -317,7 +317,8 @@ class NodeMemory:
     unless the node has stored the written ones (1010h).
 
     Args:
-        eds: content of its file; the power-on values are valid until traffic shows other values.
+        eds: content of the node's EDS file. The power-on values are valid until traffic shows other
+            values.
     """
 
     def __init__(self, eds: EdsObjects | None = None) -> None:
@@ -328,14 +329,14 @@ class NodeMemory:
         self._has_statusword = False
 
     def read(self, entry: Entry, data: bytes) -> None:
-        """Learn a value that was uploaded."""
+        """Store a value that was uploaded."""
         self._keep(entry, data)
         # A value that was read before anybody wrote it is what the node booted with.
         if entry not in self._written:
             self._power_on[entry] = data
 
     def written(self, entry: Entry, data: bytes) -> None:
-        """Learn a value that was downloaded and confirmed."""
+        """Store a value that was downloaded and confirmed."""
         if entry[0] == _STORE:
             if data == _SAVE:
                 # "save" makes all present values those of the next boot-up, the read ones
@@ -352,7 +353,7 @@ class NodeMemory:
             self._has_statusword = True
 
     def learn(self, transfer: decoded.Transfer) -> bool:
-        """Learn from a transfer that ended; return whether it tells anything."""
+        """Learn from a transfer that ended. Return whether it adds knowledge."""
         entry, data = transfer.entry, transfer.data
         if (
             entry is None
@@ -369,18 +370,18 @@ class NodeMemory:
         return True
 
     def boot(self) -> bool:
-        """Go back to power-on values; return whether that changes any."""
+        """Restore the power-on values. Return whether any value changes."""
         changed = self._now != self._power_on
         self._now, self._written = dict(self._power_on), set()
         return changed
 
     @property
     def indices(self) -> set[int]:
-        """The objects of which a value is known."""
+        """The indices of objects with a known value."""
         return {index for values in (self._now, self.eds.values) for index, _ in values}
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return a value; None if unknown."""
+        """Return a value as a number, or None if it is unknown."""
         data = self._now.get((index, sub), self.eds.values.get((index, sub)))
         return None if data is None else int.from_bytes(data, "little")
 
@@ -389,19 +390,22 @@ class NodeMemory:
         return entry in self._now
 
     def source(self, index: int) -> str:
-        """Return the source of the values of an object: traffic, if it contained one."""
+        """Return the source of the values of an object.
+
+        It is traffic if traffic contained a value.
+        """
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
         if any(entry in self._now for entry in entries):
             return decoded.SEEN
         return decoded.EDS if any(entry in self.eds.values for entry in entries) else ""
 
     def maps_statusword(self) -> None:
-        """Learn that a PDO carries 16 bits of 6041h."""
+        """Record that a PDO carries 16 bits of 6041h."""
         self._has_statusword = True
 
     @property
     def is_drive(self) -> bool:
-        """Whether the node is a drive of CiA 402.
+        """Whether the node is a CiA 402 drive.
 
         The device type decides. If it is unknown or has several profiles, the node is a drive if it
         has 6041h:00 with 16 bits.
@@ -414,7 +418,7 @@ class NodeMemory:
         return device_type & 0xFFFF == _DRIVE_PROFILE
 
     def describe(self, index: int, sub: int) -> ObjectText:
-        """Return what is known of an object; the words of a drive have the names of CiA 402."""
+        """Return the description of an object. The words of a drive have the names of CiA 402."""
         told, standard = self.eds.texts.get((index, sub)), describe_standard(index, sub)
         if told is None:
             told = standard
@@ -427,7 +431,7 @@ class NodeMemory:
 
 
 LATE: Final = 1.5
-"""A heartbeat is late after this many of its periods; the real limit is in its consumer (1016h)."""
+"""Number of periods after which a heartbeat is late. The real limit is in its consumer (1016h)."""
 _GAPS_KEPT: Final = 9
 
 
@@ -436,16 +440,16 @@ class Heartbeats:
     """The times of the heartbeats of a node, and their period.
 
     Args:
-        memory: the known objects.
+        memory: known objects of the node.
         from_boot: whether to learn the period also from the gap between a boot-up and the first
             heartbeat.
 
     Attributes:
-        last_us: time of its last reported state, None before the first.
-        since_us: time since which a heartbeat is expected; None for never.
-        gaps: gaps between the latest heartbeats, in us. A delayed node sends all pending heartbeats
-            at once. Therefore a gap shorter than half of the previous one is averaged with that,
-            which restores the period after such a burst.
+        last_us: time of the last reported state, or None before the first report.
+        since_us: time since which a heartbeat is expected, or None for never.
+        gaps: gaps between the latest heartbeats in us. A delayed node sends all pending heartbeats
+            at once. Therefore a gap shorter than half of the previous gap is averaged with the
+            previous gap, which restores the period after such a burst.
     """
 
     memory: NodeMemory = field(compare=False)
@@ -463,33 +467,33 @@ class Heartbeats:
 
     @property
     def period_us(self) -> int | None:
-        """The period: that of 1017h in traffic, else the measured one, else that of the EDS."""
+        """The period from 1017h in traffic, or else the measured period, or that of the EDS."""
         if self.gaps and not self.by_sdo:
             return _median(self.gaps)
         period_ms = self.memory.number(*HEARTBEAT_TIME)
         return period_ms * 1_000 if period_ms else None
 
     def is_late(self, now_us: int) -> bool:
-        """Return whether one is missing."""
+        """Return whether a heartbeat is missing."""
         period_us = self.period_us
         if self.since_us is None or period_us is None:
             return False
         return now_us - self.since_us > LATE * period_us
 
     def boot(self, at_us: int) -> None:
-        """Start again with a boot-up."""
+        """Restart the supervision after a boot-up."""
         self.gaps.clear()
         self._booted = True
         self.last_us = self.since_us = at_us
 
     def learn(self, at_us: int, transfer: decoded.Transfer) -> None:
-        """Process a transfer of 1017h: a new period starts again."""
+        """Process a transfer of 1017h. A new period restarts the supervision."""
         if transfer.direction is decoded.TransferDirection.DOWNLOAD or self.since_us is None:
             self.gaps.clear()
             self.since_us = at_us
 
     def take(self, at_us: int, *, learns: bool = True) -> None:
-        """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
+        """Process a heartbeat. The period is learnt from it, unless it may answer a request."""
         learns = learns and (self.from_boot or not self._booted)
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
             self._take_gap(at_us - self.last_us)
@@ -507,11 +511,11 @@ class Heartbeats:
 
 _LEAST_PAIRS: Final = 4
 PAIR_US: Final = 100_000
-"""Boot-ups, or answers to one request, that are no further from each other are of two nodes."""
+"""Longest time between boot-ups, or answers to one request, that show two nodes."""
 
 
 class TwoBeats(NamedTuple):
-    """Two interleaved heartbeats: every second frame keeps the period.
+    """Two interleaved heartbeats, of which each keeps the period with every second frame.
 
     Attributes:
         period_us: period of one heartbeat.
@@ -523,7 +527,7 @@ class TwoBeats(NamedTuple):
 
 
 def two_beats(times: Sequence[int]) -> TwoBeats | None:
-    """Find two interleaved heartbeats in the times of one CAN-ID; return None without them.
+    """Find two interleaved heartbeats in the times of one CAN-ID. Return None without them.
 
     >>> two_beats([0, 30, 100, 130, 200, 230, 300, 330]).period_us
     100
@@ -548,5 +552,8 @@ def two_beats(times: Sequence[int]) -> TwoBeats | None:
 
 
 def _median(gaps: Collection[float]) -> int:
-    """Return the median, of two the higher one; statistics would take 5 ms to import."""
+    """Return the median. Of two middle values, return the higher one.
+
+    The module statistics would take 5 ms to import.
+    """
     return round(sorted(gaps)[len(gaps) // 2])

@@ -1,4 +1,4 @@
-"""PDOs: which CAN-ID carries which of which node, and what their bits mean."""
+"""PDOs, with their CAN-IDs, their nodes, and the meaning of their bits."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ _Convert = Callable[[int], Value]
 
 
 class Field(NamedTuple):
-    """The place of a signal in a frame, and its conversion.
+    """The position of a signal in a frame, and its conversion.
 
     Attributes:
-        name: of the signal.
-        shift: its lowest bit.
-        mask: mask of its bits, shifted to bit 0.
-        sign: its sign bit, 0 if it has none.
-        convert: converts the number to the value; None if the number is the value.
-        unit: as in `Signal.unit`.
-        write: writes the value as text; None if the text is the value.
+        name: name of the signal.
+        shift: number of the lowest bit of the signal.
+        mask: mask of the signal's bits, shifted to bit 0.
+        sign: sign bit of the signal, or 0 if the signal has no sign.
+        convert: function that converts the number to the value, or None if the number is the value.
+        unit: unit as in `Signal.unit`.
+        write: function that writes the value as text, or None if the text is the value.
     """
 
     name: str
@@ -50,11 +50,11 @@ class Field(NamedTuple):
 
 
 class PdoDecoder:
-    """Decodes the frames of one PDO.
+    """Decoder of the frames of one PDO.
 
     Args:
-        pdo: kind, node and source, as in `Decoded`.
-        fields: its signals; empty if the mapping is unknown.
+        pdo: kind, node and source as in `Decoded`.
+        fields: signals of the PDO, empty if the mapping is unknown.
         bits: number of mapped bits.
         note: note for users about the mapping.
 
@@ -90,11 +90,11 @@ class PdoDecoder:
 
 
 class _MpdoLayout:
-    """Decodes multiplexed PDOs: each frame names its object.
+    """Decoder of multiplexed PDOs, in which each frame names its object.
 
     Args:
-        pdo: kind, node and source, as in `Decoded`.
-        describe: returns the descriptions of the node's objects.
+        pdo: kind, node and source as in `Decoded`.
+        describe: function that returns the descriptions of the node's objects.
     """
 
     def __init__(
@@ -120,7 +120,10 @@ class _MpdoLayout:
 
 
 def _make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
-    """Return how a mapped object is read; a type of another size than mapped is not used."""
+    """Return the field of a mapped object.
+
+    A data type whose size differs from the mapping is not used.
+    """
     name = text.name or write_entry((mapped.index, mapped.sub))
     kind = text.kind if text.kind and _fits(text.kind, mapped.bits) else None
     field = Field(name, shift, (1 << mapped.bits) - 1, unit=text.unit)
@@ -144,7 +147,7 @@ def _make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
 
 
 def _write_statusword(raw: int) -> str:
-    """Write a statusword with its state."""
+    """Return a statusword and its state as text."""
     return f"0x{raw:04X}[{drive_state(raw) or '?'}]"
 
 
@@ -162,18 +165,18 @@ def _converter(kind: DataType, text: ObjectText) -> _Convert:
 
 PDOS: Final = 512
 _PREDEFINED: Final = 4
-"""So many PDOs of each direction have a CAN-ID in the pre-defined connection set."""
+"""Number of PDOs per direction that have a CAN-ID in the pre-defined connection set."""
 PDO_OBJECTS: Final = range(0x1400, 0x1C00)
 
 _TPDO, _RPDO = "tpdo", "rpdo"
 _INDICES: Final = {_TPDO: (0x1800, 0x1A00, 0x180), _RPDO: (0x1400, 0x1600, 0x200)}
-"""First communication parameter, first mapping, pre-defined CAN-ID of the first PDO."""
+"""First communication parameter, first mapping, and pre-defined CAN-ID of PDO 1, by direction."""
 
 _Layout = PdoDecoder | _MpdoLayout
 
 
 class NodePdo(NamedTuple):
-    """One PDO of one node; those that are sent come first."""
+    """One PDO of one node. In sorted order, PDOs that the node sends come first."""
 
     receives: bool
     node: int
@@ -181,36 +184,36 @@ class NodePdo(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """As `Decoded.kind`."""
+        """Kind as in `Decoded.kind`."""
         return f"{_RPDO if self.receives else _TPDO}{self.number}"
 
     @property
     def parameter(self) -> int:
-        """The index of its communication parameter."""
+        """The index of the PDO's communication parameter."""
         return _INDICES[_RPDO if self.receives else _TPDO][0] + self.number - 1
 
     @property
     def mapping(self) -> int:
-        """The index of its mapping."""
+        """The index of the PDO's mapping."""
         return self.parameter + 0x200
 
 
 class PdoTable:
-    """PDOs by CAN-ID, as far as anybody said what they are."""
+    """PDOs by CAN-ID, as far as EDS files and traffic define them."""
 
     def __init__(self) -> None:
         self._by_can_id: dict[int, dict[NodePdo, _Layout]] = {}
         self._can_ids: dict[NodePdo, int] = {}
 
     def layout(self, can_id: int) -> _Layout | None:
-        """Return what carries this CAN-ID: who sends it, rather than who receives it."""
+        """Return the PDO with a CAN-ID. A PDO that is sent precedes a PDO that is received."""
         claims = self._by_can_id.get(can_id)
         # `NodePdo` sorts those that are sent first, so a TPDO names the fields of a shared
         # CAN-ID.
         return claims[min(claims)] if claims else None
 
     def update(self, pdo: NodePdo, memory: NodeMemory) -> set[int]:
-        """Read again what is known of a PDO; return the CAN-IDs whose meaning may be new."""
+        """Update the knowledge about a PDO. Return the CAN-IDs whose meaning may be new."""
         before = self._can_ids.pop(pdo, None)
         if before is not None:
             del self._by_can_id[before][pdo]
@@ -227,17 +230,17 @@ class PdoTable:
 
 
 def _pdo_of(node: int, index: int) -> NodePdo:
-    """Return the PDO that an object 1400h to 1BFFh is about."""
+    """Return the PDO to which an object 1400h to 1BFFh belongs."""
     return NodePdo(index < 0x1800, node, index % PDOS + 1)
 
 
 def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
-    """Return the PDOs that some objects are about."""
+    """Return the PDOs to which some objects belong."""
     return {_pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
 
 
 def can_id_of(pdo: NodePdo, memory: NodeMemory) -> int | None:
-    """Return its CAN-ID; None if it is not valid or not known."""
+    """Return the CAN-ID of a PDO, or None if it is not valid or not known."""
     predefined = _INDICES[_RPDO if pdo.receives else _TPDO][2]
     cob_id = memory.number(pdo.parameter, 1)
     if cob_id is not None:
@@ -267,7 +270,7 @@ def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
 
 
 def mapped_objects(memory: NodeMemory, mapping: int, count: int) -> list[MappedObject]:
-    """Return the mapped objects up to the first that is not known."""
+    """Return the mapped objects up to the first unknown one."""
     entries = []
     for sub in range(1, count + 1):
         value = memory.number(mapping, sub)

@@ -1,4 +1,4 @@
-"""SDO frames put together to transfers, as a third party hears them."""
+"""SDO frames combined to transfers, as an observer of the bus sees them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from tickrig.wire.errors import WireError
 
 
 class _TransferPhase(Enum):
-    """What is expected next."""
+    """The frame of a transfer that is expected next."""
 
     ASKED = auto()  # the answer to the request that began it
     SEGMENTS = auto()
@@ -64,27 +64,27 @@ class _OpenTransfer:
     """The known part of a transfer.
 
     Args:
-        at_us: time of its first frame.
-        node: the server.
+        at_us: time of the first frame.
+        node: node-ID of the server.
         direction: direction of the value.
         mode: transfer mode of the request.
-        index: None if the beginning is missing.
-        sub: None if the beginning is missing.
-        begun_by: the first request, to detect its repetition.
+        index: index of the object, or None if the beginning is missing.
+        sub: sub-index of the object, or None if the beginning is missing.
+        begun_by: first request of the transfer, used to detect its repetition.
 
     Attributes:
-        phase: what is expected next.
-        size: number of bytes, None if not indicated.
+        phase: phase that names the frame expected next.
+        size: number of bytes, or None if it is not indicated.
         sized: whether the number of bytes is indicated.
         crc: whether both sides support the CRC.
-        sent: the segment of a download that is not confirmed yet.
+        sent: segment of a download that is not confirmed yet.
         requested_toggle: toggle bit of the requested upload segment.
         taken: toggle bit of the latest accepted segment.
-        block_last: position of the last segment in its block; valid after that segment.
-        block_size: number of segments of a block that the receiver requires; 0 until the receiver
-            has sent it.
+        block_last: position of the last segment in its block. It is valid after that segment.
+        block_size: number of segments of a block that the receiver requires, or 0 until the
+            receiver has sent it.
         done: whether no more frames are expected.
-        new_flaw: what the latest frame added to `flaws`; empty if nothing.
+        new_flaw: inconsistency that the latest frame added to `flaws`, empty if there is none.
     """
 
     at_us: int
@@ -113,28 +113,28 @@ class _OpenTransfer:
 
     @property
     def entry(self) -> tuple[int, int] | None:
-        """Index and sub-index; None if they are unknown."""
+        """Index and sub-index, or None if they are unknown."""
         return None if self.index is None or self.sub is None else (self.index, self.sub)
 
     @property
     def progress(self) -> str:
-        """How many bytes have come."""
+        """The number of bytes received."""
         return f"{len(self.data)} of {self.size} B" if self.size else f"{len(self.data)} B"
 
     @property
     def is_block_over(self) -> bool:
-        """Whether all segments of a block have come."""
+        """Whether all segments of a block have been received."""
         heard = max(self._block, default=0)
         return heard in (self.block_last, self.block_size) and heard > 0
 
     def take_block_segment(self, segment: sdo_frame.BlockSegment) -> None:
-        """Keep a segment until its receipt says that it counts."""
+        """Keep a segment until its acknowledgement confirms it."""
         self._block[segment.seqno] = segment.data
         if segment.last:
             self.block_last = segment.seqno
 
     def acknowledge_block(self, ackseq: int) -> None:
-        """Take the segments that came in sequence; the others are sent again."""
+        """Accept the segments that arrived in sequence. The other segments are sent again."""
         if any(seqno not in self._block for seqno in range(1, ackseq + 1)):
             self.add_flaw("segments missing")
         self.data += b"".join(self._block.get(seqno, b"") for seqno in range(1, ackseq + 1))
@@ -146,7 +146,7 @@ class _OpenTransfer:
         self._block.clear()
 
     def end_block(self, end: sdo_frame.BlockEnd) -> None:
-        """Cut the fill of the last segment off, and compare the CRC."""
+        """Remove the padding of the last segment, and compare the CRC."""
         if end.fill:
             del self.data[-end.fill :]
         if self.crc and not self.flaws and sdo_frame.crc16(bytes(self.data)) != end.crc:
@@ -154,7 +154,7 @@ class _OpenTransfer:
         self.phase = _TransferPhase.BLOCK_ENDED
 
     def add_flaw(self, text: str) -> None:
-        """Note what does not fit, once."""
+        """Record an inconsistency once."""
         if text not in self.flaws:
             self.flaws.append(text)
             self.new_flaw = text
@@ -162,7 +162,7 @@ class _OpenTransfer:
     def close(
         self, now_us: int, outcome: TransferOutcome, *, code: int = 0, by_client: bool = False
     ) -> Transfer:
-        """Return it as a value."""
+        """Return the transfer as a value."""
         done = outcome is TransferOutcome.DONE
         if done and not self.partial and self.size not in (None, len(self.data)):
             self.add_flaw(f"size {self.size} was said")
@@ -191,7 +191,7 @@ _Answer = sdo.UploadInitiateResponse | sdo.DownloadInitiateResponse
 
 
 def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> _OpenTransfer:
-    """Open a transfer with the request that began it."""
+    """Open a transfer with its first request."""
     uploads = isinstance(request, sdo.UploadInitiateRequest | sdo_frame.BlockUploadInitiateRequest)
     direction = TransferDirection.UPLOAD if uploads else TransferDirection.DOWNLOAD
     opened = _OpenTransfer(
@@ -211,7 +211,7 @@ def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> _OpenTransf
 
 
 def _answers(running: _OpenTransfer, answer: _Answer) -> bool:
-    """Return whether this is the answer to the request; a block upload may fall back."""
+    """Return whether a frame is the answer to the request. A block upload may fall back."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     return (
         running.phase is _TransferPhase.ASKED
@@ -225,7 +225,7 @@ def _answers(running: _OpenTransfer, answer: _Answer) -> bool:
 
 
 def _take_answer(running: _OpenTransfer, answer: _Answer) -> str:
-    """Take the answer: the value itself, or leave for segments."""
+    """Process the answer, which is the value, or starts segments."""
     if isinstance(answer, sdo.DownloadInitiateResponse):
         running.done = running.mode is TransferMode.EXPEDITED and not running.partial
         running.phase = _TransferPhase.SEGMENTS
@@ -259,7 +259,7 @@ WRONG_TOGGLE: Final = "wrong toggle bit"
 
 
 def _check_toggle(running: _OpenTransfer, toggle: bool) -> None:
-    """Note that a client does not alternate the toggle bit, or does not begin with 0."""
+    """Report a client that does not alternate the toggle bit, or does not begin with 0."""
     began = running.requested_toggle is not None or running.sent is not None
     first = running.taken is None and not began and not running.partial
     if toggle == running.taken or (first and toggle):
@@ -267,7 +267,7 @@ def _check_toggle(running: _OpenTransfer, toggle: bool) -> None:
 
 
 def _request_segment(running: _OpenTransfer, request: sdo.UploadSegmentRequest) -> str:
-    """Take what a client of an upload asks for."""
+    """Process the next request of an upload client."""
     running.retries += running.requested_toggle == request.toggle
     _check_toggle(running, request.toggle)
     running.requested_toggle = request.toggle
@@ -275,7 +275,7 @@ def _request_segment(running: _OpenTransfer, request: sdo.UploadSegmentRequest) 
 
 
 def _take_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
-    """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
+    """Process a segment of an upload, unless it was repeated or its toggle bit is wrong."""
     if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
         if segment.toggle != running.requested_toggle is not None:
             running.add_flaw(WRONG_TOGGLE)
@@ -287,7 +287,7 @@ def _take_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
 
 
 def _send_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
-    """Take a segment of a download; it counts when the server has confirmed it."""
+    """Process a segment of a download. The segment counts when the server has confirmed it."""
     again = running.sent is not None and running.sent.toggle == segment.toggle
     if not again:
         _check_toggle(running, segment.toggle)
@@ -297,7 +297,7 @@ def _send_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
 
 
 def _confirm_segment(running: _OpenTransfer, response: sdo.DownloadSegmentResponse) -> str:
-    """Take the receipt of a segment."""
+    """Process the confirmation of a segment."""
     sent = running.sent
     if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
         if sent is not None and sent.toggle != response.toggle:
@@ -315,7 +315,7 @@ _END_MASK: Final = 0xE3
 
 
 def _is_block_segment(running: _OpenTransfer, sender: TransferDirection, data: bytes) -> bool:
-    """Tell a segment of a block from anything else: only the state can."""
+    """Return whether a frame is a segment of a block. Only the state shows this."""
     if running.phase is not _TransferPhase.BLOCK or running.direction is not sender:
         return False
     if len(data) != sdo_frame.FRAME_BYTES or not data[0] & sdo_frame.BLOCK_SEQNO:
@@ -326,14 +326,14 @@ def _is_block_segment(running: _OpenTransfer, sender: TransferDirection, data: b
 
 
 def _take_block_segment(running: _OpenTransfer, data: bytes) -> str:
-    """Keep a segment until its receipt."""
+    """Keep a segment until its acknowledgement."""
     segment = sdo_frame.BlockSegment.parse(data)
     running.take_block_segment(segment)
     return f"segment {segment.seqno} of a block"
 
 
 def _take_block_frame(running: _OpenTransfer, message: sdo.Request | sdo.Response) -> str:
-    """Take any other frame of a block transfer."""
+    """Process any other frame of a block transfer."""
     upload = running.direction is TransferDirection.UPLOAD
     match message, running.phase:
         case (
@@ -384,11 +384,11 @@ class SdoStep(NamedTuple):
     """The effect of one SDO frame.
 
     Attributes:
-        text: the step of the transfer, if no transfer ended with the frame.
-        entry: index and sub-index that the frame is about, if known.
-        ended: the transfers that ended with the frame.
+        text: step of the transfer, if no transfer ended with the frame.
+        entry: index and sub-index of the object in the frame, if known.
+        ended: transfers that ended with the frame.
         asks: whether the client waits for an answer to the frame.
-        flaw: an inconsistency that the frame adds to its transfer.
+        flaw: inconsistency that the frame adds to its transfer.
     """
 
     text: str
@@ -399,14 +399,14 @@ class SdoStep(NamedTuple):
 
 
 class SdoChannel:
-    """Follows the transfers between one client and one server, as a monitor sees them.
+    """Transfers between one client and one server, as an observer sees them.
 
-    It can start in the middle of a transfer: it returns the known part, marked as partial. It has
-    no time-outs, because only the client has them. A transfer is unanswered if its client starts
-    another one, or if the trace ends.
+    Observation can start in the middle of a transfer. The known part is then returned, marked as
+    partial. There are no time-outs, because only the client has them. A transfer is unanswered if
+    its client starts another one, or if the trace ends.
 
     Args:
-        node: the server's node-ID.
+        node: node-ID of the server.
     """
 
     def __init__(self, node: int) -> None:
@@ -416,12 +416,12 @@ class SdoChannel:
         self._ended: list[Transfer] = []
 
     def pending(self, now_us: int) -> Transfer | None:
-        """Return the transfer that runs, as it would end now."""
+        """Return the running transfer, as if it ended now."""
         running = self._running
         return None if running is None or running.partial else _given_up(running, now_us)
 
     def request(self, at_us: int, data: bytes) -> SdoStep:
-        """Take a frame of the client."""
+        """Process a frame of the client."""
         running = self._running
         if running and _is_block_segment(running, TransferDirection.DOWNLOAD, data):
             text = _take_block_segment(running, data)
@@ -434,7 +434,7 @@ class SdoChannel:
         return step._replace(asks=not isinstance(message, sdo.Abort | sdo_frame.BlockEnded))
 
     def response(self, at_us: int, data: bytes) -> SdoStep:
-        """Take a frame of the server."""
+        """Process a frame of the server."""
         running = self._running
         if running and _is_block_segment(running, TransferDirection.UPLOAD, data):
             return SdoStep(_take_block_segment(running, data), running.entry)
@@ -445,7 +445,7 @@ class SdoChannel:
         return self._step(at_us, self._take_response(at_us, message), message)
 
     def _step(self, at_us: int, text: str, message: sdo.Request | sdo.Response) -> SdoStep:
-        """Close a finished transfer, and return it."""
+        """Close a finished transfer and return it."""
         running, flaw = self._running, ""
         if running:
             flaw, running.new_flaw = running.new_flaw, ""
@@ -526,7 +526,7 @@ class SdoChannel:
         return text
 
     def _segmented(self, at_us: int, direction: TransferDirection) -> _OpenTransfer:
-        """Return the running segmented transfer, or one whose beginning is missing."""
+        """Return the running segmented transfer, or a new transfer whose beginning is missing."""
         running = self._running
         if running and running.direction is direction and running.phase is _TransferPhase.SEGMENTS:
             return running
@@ -536,7 +536,10 @@ class SdoChannel:
         return opened
 
     def _abort(self, at_us: int, message: sdo.Abort, *, by_client: bool) -> str:
-        """End the running transfer; an abort of another object ends one without other frames."""
+        """End the running transfer.
+
+        An abort of another object ends a transfer without other frames.
+        """
         running, entry, code = self._running, _named(message), message.code
         if running and (entry is None or running.entry in (None, entry)):
             if entry is not None:

@@ -1,4 +1,4 @@
-"""NMT, SYNC, TIME, EMCY, error control (CiA 301), LSS (CiA 305) and error frames, decoded."""
+"""Decoders for NMT, SYNC, TIME, EMCY, error control (CiA 301), LSS (CiA 305) and error frames."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _CONTROLLER: Final = (
 
 
 def decode_error(frame: ErrorFrame) -> Decoded:
-    """Decode what a controller says.
+    """Decode the error frame of a controller.
 
     >>> decode_error(ErrorFrame.parse("20000004#0020000000006080")).text
     'controller: TX passive'
@@ -78,7 +78,7 @@ def decode_nmt(at_us: int, frame: CanFrame) -> Decoded:
 
 
 def decode_sync(at_us: int, frame: CanFrame) -> Decoded:
-    """Decode SYNC, with its counter where it has one."""
+    """Decode a SYNC with its counter, if there is one."""
     if not frame.data:
         return Decoded("sync")
     counter = Signal("counter", frame.data[0])
@@ -125,9 +125,9 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
     """Decode boot-up, heartbeat or guarding.
 
     Args:
-        node: whose it is.
-        frame: the frame.
-        guarded: this answers a guarding request.
+        node: node-ID of the sender.
+        frame: frame to decode.
+        guarded: whether the frame answers a guarding request.
     """
     if frame.remote:
         return Decoded("guard", node, "guarding request", asks=True)
@@ -144,7 +144,7 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
 
 
 def nmt_state_name(state: int) -> str:
-    """Return the name of an NMT state; its number if it has none.
+    """Return the name of an NMT state, or its number if it has no name.
 
     >>> nmt_state_name(0x7F), nmt_state_name(0x11)
     ('pre-operational', '11h')
@@ -233,4 +233,4 @@ _ARGUMENTS: Final[dict[lss.LssCommand, Callable[[bytes], str]]] = {
     lss.LssCommand.ACTIVATE_BIT_TIMING: lambda data: f"after {data[1] | data[2] << 8} ms",
     lss.LssCommand.FASTSCAN: _fastscan,
 }
-"""What the master says beside a command."""
+"""Parameters of the LSS master's commands."""

@@ -33,19 +33,19 @@ from tickrig.host.text.page_text import one_line
 
 
 _SMALLEST: Final = 1e-200
-"""What is smaller counts as 0."""
+"""Amount below which a number counts as 0."""
 
 _Tick = tuple[float, str]
-"""Where, and what is written there."""
+"""Position of a tick, and its text."""
 
 
 def ticks(low: float, high: float, about: int) -> tuple[_Tick, ...]:
-    """Return round numbers between two others.
+    """Return round numbers between two other numbers.
 
     Args:
-        low: the lower number.
-        high: the higher number, above `low`.
-        about: wanted number of results; at most 2 * `about` + 1 are returned.
+        low: lower number of the range.
+        high: higher number of the range, above `low`.
+        about: wanted number of results. At most 2 * `about` + 1 numbers are returned.
     """
     exponent, step = _step(low, high, max(1, about))
     digits = max(0, -exponent)
@@ -54,7 +54,7 @@ def ticks(low: float, high: float, about: int) -> tuple[_Tick, ...]:
 
 
 def widened(low: float, high: float) -> tuple[float, float]:
-    """Return a range wide enough for floats to tell its ends apart."""
+    """Return a range that is wide enough for floats to distinguish its ends."""
     size = max(abs(low), abs(high))
     if high - low > max(size * 1e-12, _SMALLEST):
         return low, high
@@ -79,13 +79,13 @@ def _number_text(number: float, digits: int) -> str:
 
 
 class _Bar(NamedTuple):
-    """The samples of one column.
+    """The samples of one column of the picture.
 
     Attributes:
-        first: the earliest value; the line from the left ends at it.
-        low: the least value.
-        high: the greatest value.
-        last: the latest value; the line to the right starts at it.
+        first: earliest value. The line from the left ends at this value.
+        low: least value.
+        high: greatest value.
+        last: latest value. The line to the right starts at this value.
     """
 
     first: float
@@ -95,12 +95,12 @@ class _Bar(NamedTuple):
 
 
 def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Bar | None]:
-    """Return the samples in each of `columns` columns of equal time; None if there are none.
+    """Return the samples in `columns` columns of equal time, with None for empty columns.
 
     Args:
-        series: the samples.
-        from_us: beginning of the first column.
-        to_us: the last time of the last column.
+        series: samples of the signal.
+        from_us: begin of the first column.
+        to_us: end of the last column.
         columns: number of columns, at least 1.
     """
     at_us, values = series.at_us, series.values
@@ -116,10 +116,11 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Ba
 
 
 class _Stop(NamedTuple):
-    """One stop of a curve: a column, and the values in it.
+    """One stop of a curve, which is a column with its values.
 
     Attributes:
-        x: number of the column; outside the picture for the neighbours of the visible columns.
+        x: number of the column. It is outside the picture for the neighbours of the visible
+            columns.
         bar: values in the column.
     """
 
@@ -132,10 +133,10 @@ class Curve:
     """A curve for drawing, from stop to stop.
 
     Attributes:
-        label: its displayed name.
-        axis: its vertical axis.
-        unit: unit of its values.
-        stops: its stops, from left to right.
+        label: displayed name of the curve.
+        axis: number of the curve's vertical axis.
+        unit: unit of the values.
+        stops: stops of the curve, from left to right.
     """
 
     label: str
@@ -145,12 +146,12 @@ class Curve:
 
 
 class _StateRun(NamedTuple):
-    """A state that lasts.
+    """A state that lasts for some columns.
 
     Attributes:
-        begin: its first column.
-        end: one behind its last.
-        name: of the state.
+        begin: first column of the state.
+        end: column after the last column of the state.
+        name: name of the state.
     """
 
     begin: int
@@ -160,11 +161,11 @@ class _StateRun(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """States of a signal, one behind the other.
+    """The successive states of a signal.
 
     Attributes:
-        label: what people call it.
-        runs: from left to right.
+        label: displayed name of the signal.
+        runs: states from left to right.
     """
 
     label: str
@@ -176,11 +177,11 @@ class Chart:
     """All curves and bands of a picture.
 
     Attributes:
-        view: the visible part.
+        view: visible part of the signals.
         columns: number of columns of the picture.
-        curves: the curves in the requested order.
-        bands: the bands in the requested order; a band is a signal whose values are states.
-        ranges: least and greatest value by axis, in the order of the axes.
+        curves: curves in the requested order.
+        bands: bands in the requested order. A band is a signal whose values are states.
+        ranges: least and greatest value of each axis by number, in the order of the axes.
     """
 
     view: View
@@ -191,7 +192,7 @@ class Chart:
 
 
 def chart(series: Sequence[Series], view: View, columns: int) -> Chart:
-    """Reduce series to columns; a spike stays, however short it is."""
+    """Reduce series to columns. A spike stays visible, however short it is."""
     curves = tuple(
         Curve(one.label, one.axis, one.unit, _stops(one, view, columns))
         for one in series
@@ -215,7 +216,7 @@ def _stops(series: Series, view: View, columns: int) -> tuple[_Stop, ...]:
 
 
 def _runs(series: Series, view: View, columns: int) -> Iterator[_StateRun]:
-    """Yield the states in a view; each lasts until the next one."""
+    """Yield the states in a view. Each state lasts until the next one."""
     if not series.at_us:
         return
     first = max(0, (series.before(view.from_us) or 0))
@@ -254,7 +255,7 @@ def _range(curves: Sequence[Curve], axis: int, columns: int) -> tuple[float, flo
 # Curves as one HTML page: the SVG, and a cursor that reads out the values.
 
 COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Of the curves, in turn; people who see few colours tell them apart (Okabe and Ito)."""
+"""Colours of the curves in turn, which also colour-blind people can distinguish (Okabe and Ito)."""
 
 _AXIS_WIDTH: Final = 64
 _LEGEND_HEIGHT: Final = 20
@@ -277,7 +278,7 @@ _STYLE: Final = (
 
 
 class _Area(NamedTuple):
-    """Where the curves are, in pixels."""
+    """The area of the curves in pixels."""
 
     left: int
     top: int
@@ -286,7 +287,7 @@ class _Area(NamedTuple):
 
 
 def _area_of(series: Sequence[Series], width: int, height: int, title: str = "") -> _Area:
-    """Return the height left for curves by axes, bands and legend: at least 50 pixels.
+    """Return the height of the curves without axes, bands and legend, which is at least 50 pixels.
 
     With bands it is at least 150 pixels, and the picture grows with the bands.
     """
@@ -303,7 +304,10 @@ def _area_of(series: Sequence[Series], width: int, height: int, title: str = "")
 def svg(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = ""
 ) -> str:
-    """Return a picture of a size in pixels; the first axis is on the left, others on the right."""
+    """Return a picture of a size in pixels.
+
+    The first axis is on the left, other axes on the right.
+    """
     area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
     height = max(height, area.top + area.height + 2 * _BAND_HEIGHT * len(drawn.bands) + _BOTTOM)
@@ -337,7 +341,7 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
 
 
 def state_colour(band: Band, name: str) -> str:
-    """Return the colour of a state: its own, or one of those that are left, in turn."""
+    """Return the colour of a state, which is its own or one of the free colours in turn."""
     names = dict.fromkeys(run.name for run in band.runs if run.name not in _KNOWN_STATES)
     if name not in names:
         return _KNOWN_STATES[name]
@@ -350,7 +354,7 @@ def _svg_title(title: str) -> Iterator[str]:
 
 
 def _svg_bands(bands: Sequence[Band], area: _Area) -> Iterator[str]:
-    """Draw states below the curves: the name of the signal, and under it a row of states."""
+    """Draw states below the curves. The row of states is below the name of its signal."""
     for number, band in enumerate(bands):
         y = area.top + area.height + 2 * _BAND_HEIGHT * number
         yield _text_element(area.left, y + _BAND_HEIGHT - 5, "start", f"▬ {band.label}")
@@ -425,13 +429,13 @@ def _cursor(view: View, area: _Area) -> str:
 
 
 _PAGE: Final = Path(__file__).with_name("page.html")
-"""With `@title@`, `@svg@` and `@data@` where these stand."""
+"""Template of a page, in which `@title@`, `@svg@` and `@data@` are replaced."""
 
 
 def html_page(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = "canmon"
 ) -> str:
-    """Return a page that needs nothing else; what is read out are the values of a column."""
+    """Return a self-contained page. The page shows the values of a column as numbers."""
     area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
     curves: list[dict[str, object]] = [
@@ -476,16 +480,16 @@ def _letter(dots: int) -> str:
 
 
 _LETTERS: Final = tuple(_letter(dots) for dots in range(256))
-"""By the dots of the left column, then those of the right one, from the top."""
+"""Letters by the dots of the left column and then of the right column, from the top."""
 
 
 class Canvas:
-    """A field of dots in layers; a cell takes the colour of the topmost layer with dots in it.
+    """A field of dots in layers. A cell has the colour of the topmost layer with dots in the cell.
 
     Args:
-        width: in cells.
-        height: in cells.
-        layers: how many.
+        width: width in cells.
+        height: height in cells.
+        layers: number of layers.
     """
 
     def __init__(self, width: int, height: int, layers: int = 1) -> None:
@@ -493,7 +497,7 @@ class Canvas:
         self._layers = [[0] * (width * DOTS_X) for _ in range(layers)]
 
     def fill(self, x: int, top: int, bottom: int, layer: int = 0) -> None:
-        """Set the dots of a column from one row to another, both included; clip to the canvas.
+        """Set the dots of a column from one row to another, both included. Clip to the canvas.
 
         Args:
             x: column of dots, within the canvas.
@@ -506,7 +510,7 @@ class Canvas:
             self._layers[layer][x] |= (1 << bottom + 1) - (1 << top)
 
     def row(self, row: int) -> list[tuple[str, int]]:
-        """Return the letters of a row of cells, each with its layer, -1 where there is none."""
+        """Return the letters of a row of cells, each with its layer, or -1 without a layer."""
         shift, cells = row * DOTS_Y, []
         for x in range(0, self.width * DOTS_X, DOTS_X):
             dots, top = 0, -1
@@ -522,10 +526,10 @@ class _Reading(NamedTuple):
 
     Attributes:
         label: name of the curve.
-        value: of the latest sample at or before the moment; None before the first.
+        value: value of the latest sample at or before the moment, or None before the first sample.
         age_us: age of that sample.
         unit: unit of the value.
-        state: name of the value, if it is a state.
+        state: name of the value if the value is a state.
     """
 
     label: str
@@ -535,13 +539,13 @@ class _Reading(NamedTuple):
     state: str = ""
 
     def __str__(self) -> str:
-        """Write it for people."""
+        """Return the value as text for the user."""
         value = self.state or ("-" if self.value is None else f"{self.value:.6g}")
         return f"{self.label} {value} {self.unit}".rstrip()
 
 
 def read_out(series: Iterable[Series], at_us: int) -> tuple[_Reading, ...]:
-    """Return what each series last said at a moment: a signal holds until its next frame."""
+    """Return the last value of each series at a moment. A value is valid until the next frame."""
     return tuple(_reading(one, at_us) for one in series)
 
 
@@ -558,7 +562,7 @@ _COLOURS: Final = (36, 33, 35, 32, 34, 31)
 """ANSI codes of the curves, in turn."""
 
 LABEL_WIDTH: Final = 9
-"""Letters left of the first axis and right of the second."""
+"""Number of letters left of the first axis and right of the second axis."""
 
 _LEAST_WIDTH: Final = 2 * LABEL_WIDTH + 12
 _LEAST_HEIGHT: Final = 6
@@ -567,14 +571,15 @@ _LEAST_HEIGHT: Final = 6
 def render(
     series: Sequence[Series], view: View, width: int, height: int, *, colour: bool = False
 ) -> list[str]:
-    """Return the picture as lines: `height` lines, each at most `width` long.
+    """Return the picture as `height` lines, each at most `width` long.
 
-    The first lines name the curves. The second axis is on the right. The smallest size is 30 by 6;
-    a smaller size counts as that size.
+    The first lines name the curves. The second axis is on the right. The smallest size is 30 by 6.
+    A smaller size counts as that size.
 
     Args:
-        series: the curves.
-        view: the visible part; with a cursor, the first lines show the values there.
+        series: samples of the signals.
+        view: visible part of the signals. With a cursor, the first lines show the values at the
+            cursor.
         width: width in cells.
         height: height in lines.
         colour: whether to colour the curves with ANSI codes.
@@ -600,7 +605,7 @@ def render(
 
 
 def _band_line(band: Band, inner: int, colour: bool) -> str:
-    """Write states as a line: each begins with a bar and its name as far as there is room."""
+    """Return states as a line. Each state begins with a bar, and its name if there is room."""
     cells = [" "] * inner
     for run in band.runs:
         begin, end = run.begin // DOTS_X, max(run.end // DOTS_X, run.begin // DOTS_X + 1)
@@ -648,7 +653,7 @@ def _draw(canvas: Canvas, layer: int, curve: Curve, high: float, per_value: floa
 
 
 def _join(canvas: Canvas, layer: int, start: tuple[int, int], end: tuple[int, int]) -> None:
-    """Draw a line; the dots of a column reach to those of the column before."""
+    """Draw a line. The dots of a column reach to the dots of the previous column."""
     (x0, y0), (x1, y1) = start, end
     for x in range(max(0, x0 + 1), min(x1 + 1, canvas.width * DOTS_X)):
         above, here = (y0 + (y1 - y0) * (column - x0) // (x1 - x0) for column in (x - 1, x))
@@ -672,7 +677,7 @@ def _coloured(text: str, number: int) -> str:
 
 
 def _labels(drawn: Chart, number: int, rows: int) -> dict[int, str]:
-    """Return what is written beside which row for the first or the second axis."""
+    """Return the labels of the first or the second axis, by row."""
     ranges = list(drawn.ranges.values())
     if number >= len(ranges):
         return {}
@@ -704,7 +709,7 @@ def _time_axis(view: View, inner: int) -> list[str]:
 
 
 def _moment(at_us: int, stamp: Stamp, digits: int) -> str:
-    """Write seconds of the epoch, or the time of day.
+    """Return a moment as text, in seconds of the epoch or as time of day.
 
     >>> _moment(1_700_000_000_250_000, Stamp.ABSOLUTE, 2)
     '1700000000.25'
@@ -716,7 +721,7 @@ def _moment(at_us: int, stamp: Stamp, digits: int) -> str:
 
 
 def _cell(at_us: int, view: View, inner: int) -> int:
-    """Return the column of cells of a moment, the nearest that there is."""
+    """Return the column of cells that is nearest to a moment."""
     cell = (at_us - view.from_us) * inner // (view.span_us + 1)
     return min(max(cell, 0), inner - 1)
 
@@ -725,7 +730,7 @@ def _cell(at_us: int, view: View, inner: int) -> int:
 
 
 MOST: Final = 200_000
-"""Samples of a signal that are kept."""
+"""Number of samples that are kept of a signal."""
 
 _WINDOW_US: Final = 10_000_000
 _COLUMNS: Final = 200
@@ -733,7 +738,7 @@ _COLUMNS: Final = 200
 
 
 class ViewMode(StrEnum):
-    """What is seen."""
+    """Part of the traffic that is visible."""
 
     LIVE = "live"  # a window that ends now
     ALL = "all"  # all samples
@@ -741,20 +746,20 @@ class ViewMode(StrEnum):
 
 
 class LiveGraph:
-    """Collects the values of signals, and shows them.
+    """Graph that collects the values of signals and shows them.
 
     Args:
-        mode: the initial view.
+        mode: mode of the initial view.
 
     Attributes:
-        words: the signals.
-        mode: the view.
+        words: signals of the graph.
+        mode: mode of the view.
         window_us: length of the window that ends now.
-        cursor_us: time of the cursor, None for none.
-        axis: the vertical axis that is zoomed and moved.
-        now_us: the latest time of the frames.
-        first_us: time of the first frame, None to count from the first sample.
-        stamp: notation of times.
+        cursor_us: time of the cursor, or None without a cursor.
+        axis: vertical axis that is zoomed and moved.
+        now_us: latest time of the frames.
+        first_us: time of the first frame, or None to count from the first sample.
+        stamp: format of times.
     """
 
     def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:
@@ -774,7 +779,7 @@ class LiveGraph:
         return self._collector.series
 
     def add(self, word: CurveSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
-        """Show one more signal; its values in frames of the past are taken, too."""
+        """Show one more signal. Its values in past frames are also taken."""
         fresh = Collector([word], None, MOST)
         for record, decoded in past:
             fresh.take_decoded(record, decoded)
@@ -782,7 +787,7 @@ class LiveGraph:
         self.words.append(word)
 
     def remove(self, number: int) -> None:
-        """Show a signal no more."""
+        """Stop showing a signal."""
         self._collector.remove(number)
         del self.words[number]
 
@@ -791,12 +796,12 @@ class LiveGraph:
         self._collector.take_decoded(record, decoded)
 
     def clear(self) -> None:
-        """Forget all samples."""
+        """Delete all samples."""
         for series in self.series:
             series.clear()
 
     def view(self) -> View:
-        """Return what is seen now."""
+        """Return the visible part."""
         whole = View.of(self.series)
         if not self._origin_us or whole.to_us < self._origin_us:
             self._origin_us = whole.origin_us
@@ -822,23 +827,26 @@ class LiveGraph:
         return render(self.series, self.view(), width, height, colour=True)
 
     def show(self, mode: str) -> None:
-        """See something else, without the cursor; `HELD` stops what is seen now."""
+        """Change the view and remove the cursor. `HELD` stops the present view."""
         self._held = self.view()
         self.mode, self.cursor_us = ViewMode(mode), None
 
     def zoom(self, factor: float) -> None:
-        """Come closer by a factor: to the end of a live window, else to the cursor or middle."""
+        """Zoom in by a factor, at the end of a live window, or else at the cursor or the middle."""
         if self.mode is ViewMode.LIVE:
             self.window_us = max(LEAST_US, round(self.window_us / factor))
             return
         self._hold(self.view().zoomed(factor, self.cursor_us))
 
     def move(self, fraction: float) -> None:
-        """Move what is seen by a fraction of it, later for a positive one."""
+        """Move the view by a fraction of its span. A positive fraction moves to later times."""
         self._hold(self.view().moved(fraction))
 
     def move_cursor(self, fraction: float) -> None:
-        """Move the cursor by a fraction of what is seen, which stops; it begins in the middle."""
+        """Move the cursor by a fraction of the view, which stops.
+
+        The cursor begins in the middle.
+        """
         view = self.view()
         middle_us = (view.from_us + view.to_us) // 2
         at_us = middle_us if self.cursor_us is None else self.cursor_us
@@ -847,24 +855,24 @@ class LiveGraph:
         self._hold(view)
 
     def next_axis(self) -> None:
-        """Choose the next vertical axis that a signal has."""
+        """Select the next vertical axis that has a signal."""
         axes = sorted({word.axis for word in self.words}) or [1]
         self.axis = next((axis for axis in axes if axis > self.axis), axes[0])
 
     def stretch(self, factor: float) -> None:
-        """Come closer to the middle of the axis by a factor."""
+        """Zoom the axis by a factor. Its middle stays where it is."""
         low, high = self._range()
         middle, half = (low + high) / 2, (high - low) / 2 / factor
         self._set_range(middle - half, middle + half)
 
     def lift(self, fraction: float) -> None:
-        """Move the axis by a fraction of its range, higher for a positive one."""
+        """Move the axis by a fraction of its range. A positive fraction moves to higher values."""
         low, high = self._range()
         by = (high - low) * fraction
         self._set_range(low + by, high + by)
 
     def fit(self) -> None:
-        """Let the range of the axis be that of what is seen."""
+        """Fit the range of the axis to the visible values."""
         self._ranges.pop(self.axis, None)
 
     def _hold(self, view: View) -> None:

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 
 EXTENDED: Final = 1 << 31
-"""In a key: a 29-bit identifier."""
+"""Flag of a 29-bit identifier in a key."""
 
 _FORM: Final = (
     "ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s*0.001: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5;"
@@ -75,12 +75,13 @@ class FrameSlice:
     Attributes:
         can_id: identifier of the frame.
         extended: whether the identifier has 29 bits.
-        first_bit: 0..511, in classic CAN 0..63; bit 0 is the lowest bit of byte 0.
+        first_bit: number of the lowest bit, 0..511, in classic CAN 0..63. Bit 0 is the lowest bit
+            of byte 0.
         bits: number of bits, 1..64.
-        kind: `u` unsigned, `s` signed, `f` float.
-        big_endian: whether the first byte is the highest one; for whole bytes only.
-        factor: the number is multiplied by it.
-        offset: then added.
+        kind: kind of the number: `u` unsigned, `s` signed, `f` float.
+        big_endian: whether the first byte is the highest byte, for whole bytes only.
+        factor: factor that multiplies the number.
+        offset: offset that is then added.
     """
 
     can_id: int
@@ -94,22 +95,25 @@ class FrameSlice:
 
     @property
     def key(self) -> int:
-        """The identifier, bit 31 set for an extended one."""
+        """The identifier. Bit 31 is set for an extended identifier."""
         return self.can_id | (EXTENDED if self.extended else 0)
 
     @property
     def data_bytes(self) -> int:
-        """How many bytes a frame must have to hold it."""
+        """The number of bytes that a frame must have to contain the slice."""
         return (self.first_bit + self.bits + 7) // 8
 
     def value(self, data: bytes) -> float | None:
-        """Return the value in a frame's data, None where the frame is too short."""
+        """Return the value in the data of a frame, or None if the frame is too short."""
         if len(data) < self.data_bytes:
             return None
         return self._number(data) * self.factor + self.offset
 
     def values(self, payload: NDArray[np.uint64]) -> NDArray[np.float64]:
-        """Return the values in many payloads of eight bytes, each one little-endian number."""
+        """Return the values in many payloads of eight bytes.
+
+        A payload is one little-endian number.
+        """
         import numpy as np  # noqa: PLC0415 - an extra
 
         drop = np.uint64(64 - self.bits)
@@ -144,7 +148,7 @@ def parse_slice(text: str) -> FrameSlice:
     """Read a slice.
 
     Raises:
-        ValueError: not a slice, or bits that no frame has.
+        ValueError: the text is not a slice, or has bits that no frame has.
     """
     match = _NOTATION.fullmatch(text)
     if match is None:
@@ -203,9 +207,9 @@ class ObjectName:
     """An object of a node, or one bit of it.
 
     Attributes:
-        node: node-ID; None for any node, also for a signal of a DBC file, which has no node.
-        name: name that the decoder uses, or its beginning; in lower case.
-        bit: number of the bit; None for the whole value.
+        node: node-ID, or None for any node. A signal of a DBC file has no node, and is also None.
+        name: name that the decoder uses, or the beginning of that name, in lower case.
+        bit: number of the bit, or None for the whole value.
     """
 
     node: int | None
@@ -213,7 +217,7 @@ class ObjectName:
     bit: int | None = None
 
     def value(self, signal: Signal) -> float | None:
-        """Return the number of a signal, None where it is no number."""
+        """Return the number of a signal, or None if the signal is not a number."""
         value = signal.value
         if not isinstance(value, int | float):
             return None
@@ -224,11 +228,11 @@ class ObjectName:
 
 @dataclass(frozen=True, slots=True)
 class _BusSignal:
-    """A signal of a bus or a node that is not the value of an object.
+    """A signal of a bus or node that is not the value of an object.
 
     Attributes:
-        kind: a key of `BUS_SIGNALS`.
-        node: node-ID; None for any node.
+        kind: kind of the signal, a key of `BUS_SIGNALS`.
+        node: node-ID, or None for any node.
     """
 
     kind: str
@@ -243,10 +247,10 @@ BUS_SIGNALS: Final = {
     SDO: "duration of SDO transfers",
     SYNC_JITTER: "difference of each SYNC period from the one before",
 }
-"""Words for signals that no frame carries, and what they are."""
+"""Words for signals that are not in the data of frames, with their descriptions."""
 
 OF_NODES: Final = (NMT, EMCY, SDO)
-"""Those that each node has."""
+"""Signals that each node has."""
 
 _BUS_SIGNAL: Final = re.compile(
     r"(?:([0-9]{1,3})\.)?(nmt|emcy|sdo)|load|sync[ ._-]jitter", re.ASCII
@@ -255,13 +259,13 @@ _BUS_SIGNAL: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class CurveSpec:
-    """A requested curve.
+    """A requested curve of the graph.
 
     Attributes:
-        label: its name; empty if the text has none.
-        source: the source of its values.
-        axis: its vertical axis, from 1.
-        text: the signal as written.
+        label: name of the curve, empty if the text has none.
+        source: source of the values.
+        axis: vertical axis of the curve, from 1.
+        text: text of the signal.
     """
 
     label: str
@@ -271,10 +275,10 @@ class CurveSpec:
 
 
 def parse_signal(text: str) -> CurveSpec:
-    """Read `[LABEL=]SIGNAL[@AXIS]`: a slice as 181[2:6]s*0.001, or an object as 3.position.
+    """Read `[LABEL=]SIGNAL[@AXIS]`, with a slice as 181[2:6]s*0.001, or an object as 3.position.
 
     Raises:
-        ValueError: not a signal.
+        ValueError: the text is not a signal.
     """
     match = _WORD.fullmatch(text)
     if match is None:
@@ -303,17 +307,17 @@ class Series:
     """A signal's values in the order of their times.
 
     Args:
-        label: its displayed name.
-        axis: the vertical axis it is drawn on, from 1.
-        unit: unit of the values; empty if unknown.
+        label: displayed name of the signal.
+        axis: vertical axis of the signal, from 1.
+        unit: unit of the values, empty if unknown.
         most: number of samples to keep. When there are twice as many, the oldest are removed. 0
             keeps all.
 
     Attributes:
-        at_us: the times.
-        values: the values at these times.
+        at_us: times of the samples.
+        values: values at these times.
         not_numbers: number of values that were left out because they were NaN or infinite.
-        names: names of the values if they are states; None if they are numbers.
+        names: names of the values if the values are states, or None if they are numbers.
     """
 
     label: str
@@ -326,11 +330,14 @@ class Series:
     names: dict[float, str] | None = None
 
     def __len__(self) -> int:
-        """Count the samples."""
+        """Return the number of samples."""
         return len(self.at_us)
 
     def append(self, at_us: int, value: float) -> None:
-        """Add a sample; one that is earlier than the last takes the time of the last."""
+        """Add a sample.
+
+        A sample that is earlier than the last one gets the time of the last one.
+        """
         if not isfinite(value):
             self.not_numbers += 1
             return
@@ -342,7 +349,7 @@ class Series:
             del self.at_us[: -self.most], self.values[: -self.most]
 
     def extend(self, at_us: bytes, values: bytes) -> None:
-        """Add many samples: 64-bit numbers and doubles of this machine."""
+        """Add many samples as 64-bit numbers and doubles of this machine."""
         times, numbers = array("q", at_us), array("d", values)
         rises = not (times and self.at_us) or times[0] >= self.at_us[-1]
         if rises and all(map(isfinite, numbers)) and all(map(le, times, islice(times, 1, None))):
@@ -360,25 +367,25 @@ class Series:
         self.append(at_us, value)
 
     def name(self, value: float) -> str:
-        """Return the name of a state; empty for a number."""
+        """Return the name of a state, empty for a number."""
         return "" if self.names is None else self.names.get(value, f"{value:g}")
 
     def clear(self) -> None:
-        """Forget the samples."""
+        """Delete the samples."""
         del self.at_us[:], self.values[:]
 
     def between(self, from_us: int, to_us: int) -> slice:
-        """Return which samples lie in a span of time, both ends included."""
+        """Return the samples in a span of time that includes both ends."""
         return slice(bisect_left(self.at_us, from_us), bisect_right(self.at_us, to_us))
 
     def before(self, at_us: int) -> int | None:
-        """Return the index of the latest sample at or before a time, None if there is none."""
+        """Return the index of the latest sample at or before a time, or None if there is none."""
         index = bisect_right(self.at_us, at_us) - 1
         return index if index >= 0 else None
 
 
 LEAST_US = 10
-"""No view is shorter."""
+"""Duration of the shortest view."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -386,12 +393,12 @@ class View:
     """A span of time, and optionally the ranges of vertical axes.
 
     Attributes:
-        from_us: its beginning.
-        to_us: its end, after the beginning.
-        ranges: least and greatest value by axis; other axes fit the visible values.
-        cursor_us: a moment that is marked.
-        origin_us: the moment that is written as 0.
-        stamp: format of times: since the origin, as seconds since the epoch, or as dates.
+        from_us: begin of the span.
+        to_us: end of the span, after its begin.
+        ranges: least and greatest value of each axis by number. Other axes fit the visible values.
+        cursor_us: moment that is marked, or None.
+        origin_us: moment that is written as 0.
+        stamp: format of times, since the origin, as seconds since the epoch, or as dates.
     """
 
     from_us: int
@@ -411,7 +418,7 @@ class View:
 
     @classmethod
     def of(cls, series: Iterable[Series]) -> View:
-        """Return the view in which all samples are seen; the first is its origin."""
+        """Return the view that contains all samples. The first sample is its origin."""
         spans = [(one.at_us[0], one.at_us[-1]) for one in series if one.at_us]
         from_us = min((span[0] for span in spans), default=0)
         to_us = max([from_us + 1, *(span[1] for span in spans)])
@@ -419,22 +426,25 @@ class View:
 
     @property
     def span_us(self) -> int:
-        """How long it is."""
+        """The duration of the view."""
         return self.to_us - self.from_us
 
     def seconds(self, at_us: int) -> float:
-        """Return a moment as it is written: in seconds since the origin."""
+        """Return a moment in seconds since the origin, as it is displayed."""
         return (at_us - self.origin_us) / 1e6
 
     def zoomed(self, factor: float, at_us: int | None = None) -> View:
-        """Return it `factor` times closer; `at_us`, else the middle, stays where it is."""
+        """Return the view `factor` times closer. `at_us`, or else the middle, stays where it is."""
         at_us = (self.from_us + self.to_us) // 2 if at_us is None else at_us
         span_us = max(LEAST_US, round(self.span_us / factor))
         from_us = at_us - (at_us - self.from_us) * span_us // self.span_us
         return replace(self, from_us=from_us, to_us=from_us + span_us)
 
     def moved(self, fraction: float) -> View:
-        """Return it moved by a fraction of its span, later for a positive one."""
+        """Return the view moved by a fraction of its span.
+
+        A positive fraction moves to later times.
+        """
         by_us = round(self.span_us * fraction)
         return replace(self, from_us=self.from_us + by_us, to_us=self.to_us + by_us)
 
@@ -443,21 +453,21 @@ class View:
 
 
 class Collector:
-    """Collects the values of some signals.
+    """Collector of the values of some signals.
 
     A name that is only the beginning of an object's name selects the first object that matches.
 
     Args:
-        words: the signals.
-        decoder: decodes objects; without a decoder they have no values.
-        most: as in `Series.most`.
-        rates: bit rates of the bus, for its load.
+        words: texts of the signals.
+        decoder: decoder of objects. Without a decoder, objects have no values.
+        most: number of samples as in `Series.most`.
+        rates: bit rates of the bus, used for its load.
         each_node: whether a signal without a node has one series for each node that sends it.
 
     Attributes:
-        series: one for each word.
+        series: series for each signal.
         object_names: names of the objects in the traffic during the search for one.
-        first_us: time of the first frame; None before it.
+        first_us: time of the first frame, or None before it.
     """
 
     def __init__(
@@ -487,11 +497,11 @@ class Collector:
 
     @property
     def missing(self) -> list[str]:
-        """The objects that did not occur, as they were written."""
+        """The objects that did not occur, as the user wrote them."""
         return [one.text for one in self._objects if not one.is_found]
 
     def join(self, other: Collector) -> None:
-        """Take over the signals of another one, with their samples."""
+        """Take over the signals and the samples of another collector."""
         self.series += other.series
         self._objects += other._objects
         self._samplers += other._samplers
@@ -499,7 +509,7 @@ class Collector:
             self._slices[key] += pairs
 
     def remove(self, number: int) -> None:
-        """Forget a signal."""
+        """Remove a signal."""
         gone = self.series.pop(number)
         for pairs in self._slices.values():
             pairs[:] = [pair for pair in pairs if pair[1] is not gone]
@@ -529,7 +539,7 @@ class Collector:
                 self._sample(sampler, fresh, record, decoded)
 
     def _sample(self, beside: _Sampler, node: int, record: Record, decoded: Decoded | None) -> None:
-        """Begin a series of one more node that has a signal of any node."""
+        """Begin a series for one more node with a signal of any node."""
         for one in self._samplers:
             if (one.wanted.kind, one.node) == (beside.wanted.kind, node):
                 return
@@ -548,7 +558,7 @@ class Collector:
             self.take(record)
 
     def take_columns(self, columns: Columns) -> None:
-        """Take the values of slices in a block of a log."""
+        """Take the values of slices from a block of a log."""
         if self.first_us is None and len(columns):
             self.first_us = int(columns.at_us[0])
         for key, pairs in self._slices.items():
@@ -566,12 +576,13 @@ _NO_ERROR: Final = range(0x0000, 0x0100)
 
 
 class _Sampler:
-    """Collects a signal of a bus or a node that is not in the data of a frame.
+    """Collector of a signal of a bus or a node that is not in the data of a frame.
 
     Args:
-        word: the signal as written.
-        wanted: the signal; a signal of any node is that of the first node that has it.
-        series: series for its values.
+        word: text of the signal.
+        wanted: requested signal. A signal of any node belongs to the first node that has the
+            signal.
+        series: series for the values.
         rates: bit rates of the bus.
     """
 
@@ -591,7 +602,10 @@ class _Sampler:
             series.label = f"{wanted.node}.{wanted.kind}"
 
     def take(self, record: Record, decoded: Decoded | None) -> int | None:
-        """Take a frame; of a signal of any node, return the node-ID of another one that has it."""
+        """Take a frame.
+
+        For a signal of any node, return the node-ID of another node with the signal.
+        """
         if self.wanted.kind == LOAD:
             self._load(record)
         elif decoded is None:
@@ -613,7 +627,7 @@ class _Sampler:
         return None
 
     def _values(self, decoded: Decoded) -> list[tuple[float, str]]:
-        """Return what a frame says of the signal of its node, each with its name if it has one."""
+        """Return the values in a frame for the signal, each with its name if it has one."""
         kind, told = decoded.kind, decoded.signals[0].value if decoded.signals else None
         match self.wanted.kind:
             case "sdo":
@@ -629,7 +643,7 @@ class _Sampler:
                 return []
 
     def _load(self, record: Record) -> None:
-        """Count the bits of a frame; the value of a window is added when it is over."""
+        """Count the bits of a frame. The value of a window is added when the window is over."""
         at_us, channel, frame, _ = record
         if self._begin_us < 0:
             self._begin_us, self._channel = at_us, channel
@@ -664,7 +678,7 @@ _STATUSWORD: Final = "statusword"
 
 
 class _Object:
-    """A requested object."""
+    """A requested object of a node."""
 
     def __init__(
         self, word: CurveSpec, wanted: ObjectName, series: Series, known: dict[str, None]
@@ -676,16 +690,16 @@ class _Object:
 
     @property
     def is_found(self) -> bool:
-        """Whether it has occurred."""
+        """Whether the object has occurred."""
         return self._found is not None
 
     @property
     def text(self) -> str:
-        """How it was written."""
+        """The text of the object as the user wrote it."""
         return self._word.text
 
     def take(self, at_us: int, decoded: Decoded) -> None:
-        """Take its value, if it is among the signals."""
+        """Take the value of the object if it is among the signals."""
         if self._found is None and len(self._known) < _MOST_HEARD:
             self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
@@ -702,7 +716,7 @@ class _Object:
                     self.series.append(at_us, value)
 
     def _find(self, place: tuple[int | None, str], unit: str) -> None:
-        """Keep to the first that fits, and call the curve so."""
+        """Keep the first object that fits, and use its name for the curve."""
         self._found = place
         self._is_state = self._wanted.bit is None and place[1] == _STATUSWORD
         if self._wanted.bit is None:
@@ -714,7 +728,7 @@ class _Object:
 
 
 _MOST_HEARD: Final = 2_000
-"""Names that are kept to guess which one was meant."""
+"""Number of names that are kept to suggest one after a misspelt name."""
 
 
 def _named(node: int | None, name: str) -> str:

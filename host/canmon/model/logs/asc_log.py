@@ -1,4 +1,4 @@
-"""Vector's ASC logs, with any header, with absolute and with relative times.
+"""Reader of Vector's ASC logs with any header, with absolute and with relative times.
 
 >>> lines, tally = _AscLines(), log_file.LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
@@ -20,13 +20,13 @@ from tickrig.wire import can
 from tickrig.wire.errors import WireError
 
 _BUS_ERROR: Final = can.ErrorFrame(can.ErrorClass.BUS_ERROR)
-"""What `ErrorFrame` in a line says: it does not name the error as linux/can/error.h does."""
+"""Meaning of `ErrorFrame` in a line, which does not name the error as linux/can/error.h does."""
 
 _FDF: Final = 0x1000
-"""The flag of a CAN FD frame in a line `CANFD`; the bits above it are BRS and ESI."""
+"""Flag of a CAN FD frame in a line `CANFD`. The bits above it are BRS and ESI."""
 _RTR: Final = 0x10
 _DECIMAL_DIGITS: Final = 3
-"""So many a byte has, where it is decimal and filled up with zeros."""
+"""Number of digits of a decimal byte that is padded with zeros."""
 
 _TIMED: Final = re.compile(r"\s*([0-9]{1,12})\.([0-9]{1,9})\s+(.*\S)\s*", re.ASCII | re.DOTALL)
 _CLASSIC: Final = re.compile(
@@ -44,7 +44,7 @@ _FRAME: Final = re.compile(
     r"|[0-9]+\s+(?:[0-9A-F]+x?\b(?!\s+TxRq\b)|\S+\s+(?:Rx|Tx)\b)",
     re.ASCII | re.IGNORECASE,
 )
-"""Begins what was meant as a frame; any other line with a time is an event."""
+"""Beginnings of lines that should be frames. Any other line with a time is an event."""
 
 _SILENT: Final = re.compile(
     r"(?:$|//|date\b|base\b|(?:no\s+)?internal\s+events|(?:begin|end)\s+triggerblock)",
@@ -81,14 +81,14 @@ _MONTHS: Final = {
     },
     **{"mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12},
 }
-"""English, and German where that differs: Vector's tools write the names of the machine."""
+"""Names in English, and in German if they differ. Vector's tools write names of the machine."""
 
 
 class _AscLines:
-    """Reads the lines of an ASC log, in their order.
+    """Reader of the lines of an ASC log, in their order.
 
     Times count from the date of the header, or of the trigger block that contains the line. With
-    `timestamps relative` a time counts from the previous line that has a time.
+    `timestamps relative`, a time counts from the previous line that has a time.
     """
 
     def __init__(self) -> None:
@@ -97,7 +97,7 @@ class _AscLines:
         self._now_us = 0
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame, what the line is instead, or None for a bad line."""
+        """Return a frame, the other content of the line, or None for a bad line."""
         timed = _TIMED.fullmatch(line)
         if timed is None:
             text = line.strip()
@@ -113,7 +113,7 @@ class _AscLines:
             return None
 
     def _head(self, text: str, tally: log_file.LogTally) -> str:
-        """Take a line without a time: what it says of those that follow."""
+        """Read a line without a time, which describes the lines after it."""
         if base := _BASE.match(text):
             self._base, self._guessed = 10 if base[1].lower() == "dec" else 16, False
             self._relative = (base[2] or "").lower() == "relative"
@@ -174,7 +174,7 @@ class _AscLines:
     def _classic(
         self, ident: str, extended: bool, remote: bool, length: str | None, rest: str
     ) -> can.CanFrame:
-        """Return a frame; of a length code above 8 it has 8 bytes."""
+        """Return a frame. A length code above 8 means 8 bytes."""
         words, size = rest.split(), 0 if length is None else self._length(length)
         # Three digits a byte: `007 255` is decimal, hexadecimal bytes have two.
         if self._guessed and any(len(word) == _DECIMAL_DIGITS for word in words[:size]):
@@ -187,13 +187,13 @@ class _AscLines:
         return can.CanFrame(can_id, self._data(words, size), False, extended).checked()
 
     def _length(self, text: str) -> int:
-        """Read a length code, one hexadecimal digit or more of the base."""
+        """Read a length code, which is one hexadecimal digit or more digits of the base."""
         # `d 8`, `d f`: one digit is hexadecimal whatever the base, codes above 8 mean eight
         # bytes.
         return min(can.MAX_DATA_BYTES, int(text, 16 if len(text) == 1 else self._base))
 
     def _can_id(self, digits: str, extended: bool) -> tuple[int, bool]:
-        """Read an identifier; some programs leave out the x of one that has 29 bits."""
+        """Read an identifier. Some programs omit the x of a 29-bit identifier."""
         can_id = int(digits, self._base)
         return can_id, extended or can_id > can.STANDARD_MAX
 
@@ -203,7 +203,7 @@ class _AscLines:
         return bytes(int(word, self._base) for word in words[:length])
 
     def _fd(self, words: list[str]) -> AnyFrame:
-        """Read what stands behind the direction of a line CANFD; a name may follow the CAN-ID."""
+        """Read the part of a line CANFD after the direction. A name may follow the CAN-ID."""
         ident, *words = words
         brs, esi, dlc, size, *rest = words[0 if words[0].isdecimal() else 1 :]
         length = int(size)
@@ -214,7 +214,7 @@ class _AscLines:
         return self._flagged(ident, dlc, data, flags, switches)
 
     def _xl(self, words: list[str]) -> AnyFrame | None:
-        """Read a line CANXL; None for a frame that is one of CAN XL."""
+        """Read a line CANXL. Return None for a CAN XL frame."""
         kind, _, _, ident, *words = words
         if kind.upper() == "XLFF":
             return None
@@ -226,7 +226,10 @@ class _AscLines:
         return self._flagged(ident, dlc, self._data(rest, length), flags, switches)
 
     def _flagged(self, ident: str, dlc: str, data: bytes, flags: int, switches: int) -> AnyFrame:
-        """Return the frame that its flags say: classic frames stand in such lines, too."""
+        """Return the frame that the flags of a line define.
+
+        The line may contain a classic frame.
+        """
         can_id, extended = self._can_id(ident.rstrip("xX"), ident[-1:] in ("x", "X"))
         if flags & _FDF or len(data) > can.MAX_DATA_BYTES:
             return can.FdFrame(can_id, data, extended, switches).checked()
@@ -236,7 +239,7 @@ class _AscLines:
 
 
 def _note_errors(event: str, tally: log_file.LogTally) -> None:
-    """Note what an event says of errors: no frame shows them."""
+    """Record a bus error in an event that no frame shows."""
     if state := _STATE.match(event):
         tally.errors_told[_STATES[state[1].lower()]] += 1
     elif _STATISTIC.match(event):
@@ -244,7 +247,7 @@ def _note_errors(event: str, tally: log_file.LogTally) -> None:
 
 
 def _date_us(text: str) -> int | None:
-    """Parse a date of a header, which is local time; return None if it is not a date.
+    """Parse a date of a header in local time. Return None if the text is not a date.
 
     >>> _date_us("Sam Sep 30 15:06:13.191 2017") == _date_us("Sat Sep 30 03:06:13.191 pm 2017")
     True

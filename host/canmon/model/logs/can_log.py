@@ -1,7 +1,7 @@
-"""Log files that python-can reads: BLF and, with asammdf, MF4.
+"""Log files that python-can reads, which are BLF and, with asammdf, MF4.
 
 A BLF log is a header followed by objects. Most objects are containers. The contents of all
-containers, joined, are the objects of interest; an object may extend over two containers.
+containers, joined, are the objects of interest. An object may extend over two containers.
 
 python-can reads a truncated log up to its end and does not report the truncation. It skips two of
 the three kinds of error frames.
@@ -46,7 +46,7 @@ from tickrig.wire.errors import WireError
 
 
 def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | None:
-    """Return a frame; None for impossible frames and times, which are counted."""
+    """Return a frame, or None for impossible frames and times, which are counted."""
     try:
         at_us = log_file.to_us(message.timestamp)
     except ValueError:
@@ -64,7 +64,7 @@ def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | N
 
 
 def to_can(record: Record, channel: str | int) -> can.Message:
-    """Return the message that python-can's writers take."""
+    """Return a message for python-can's writers."""
     at_us, _, frame, sent = record
     if isinstance(frame, ErrorFrame):
         message = can.Message(
@@ -80,18 +80,18 @@ _BROKEN: Final = (
     *(ValueError, LookupError, TypeError, ArithmeticError, EOFError, NotImplementedError),
     *(struct.error, zlib.error, BLFParseError, can.CanError),
 )
-"""What python-can's readers raise in files that they do not understand."""
+"""Errors that python-can's readers raise for files that they cannot read."""
 
 _UNSAID: Final = logging.NullHandler()
-"""For what python-can logs of objects: what is not read of them is counted here."""
+"""Handler that drops python-can's log messages. Skipped objects are counted here."""
 
 
 _NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
-"""Said where it is not there."""
+"""Message if asammdf is not installed."""
 
 
 class CanLogReader:
-    """A reader of a log that python-can understands."""
+    """Reader of a log that python-can can read."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()
@@ -101,7 +101,7 @@ class CanLogReader:
         return cast("Iterator[Record]", self.blocks(None))
 
     def blocks(self, apart: _TakeApart | None) -> Iterator[Record | BlfBlock]:
-        """Read the file; what `apart` takes apart of a BLF log comes as it gives it."""
+        """Read the file. `apart` parses the containers of a BLF log and determines their form."""
         self.tally = LogTally()
         names: dict[object, str] = {}
         for message in self._messages(apart):
@@ -116,7 +116,7 @@ class CanLogReader:
                 yield record
 
     def items(self) -> Iterator[Record]:
-        """Read the file; its marks are counted alone."""
+        """Read the file. Its marks are only counted."""
         return iter(self)
 
     def _messages(self, apart: _TakeApart | None) -> Iterator[can.Message | BlfBlock]:
@@ -164,7 +164,7 @@ class CanLogReader:
 
 
 def channel_name(channel: object) -> str:
-    """Return the name of a bus, no longer than logs hold; some formats have numbers alone."""
+    """Return the name of a bus with a length that logs can hold. Some formats have only numbers."""
     name = "_".join(str(channel).split())
     if channel is None or not name:
         return UNNAMED
@@ -175,10 +175,10 @@ class BlfBlock(NamedTuple):
     """The content of a container.
 
     Attributes:
-        rows: its frames, in the form that its parser returns.
+        rows: frames of the container, in the form that its parser returns.
         frames: number of frames.
         notes: offset, size and type of the objects that report errors.
-        end: end of its last complete object.
+        end: end of the last complete object.
     """
 
     rows: Any
@@ -188,7 +188,7 @@ class BlfBlock(NamedTuple):
 
 
 _TakeApart = Callable[[bytes, float], BlfBlock | None]
-"""Takes the contents of a container apart, whose log begins at a time in s."""
+"""Function that parses the content of a container. Its log begins at a time in s."""
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
 _OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
@@ -196,7 +196,7 @@ _CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in 
 OBJECT_BYTES: Final = _OBJECT.size
 _SIGNATURE: Final = b"LOBJ"
 _SEARCHED: Final = 8
-"""Bytes in which an object begins: behind the padding of the one before."""
+"""Number of bytes in which an object begins, because padding may be before it."""
 
 _CONTAINER_TYPE: Final = 10
 _DEFLATED: Final = 2
@@ -204,23 +204,23 @@ _DEFLATED: Final = 2
 ERROR, STATISTIC, DRIVER_ERROR, FD_ERROR = 2, 4, 31, 104
 """Types of objects that report errors and that python-can skips."""
 BLF_FRAMES: Final = (ERROR, 73, 100, 101, FD_ERROR)
-"""Types of frames that are no data or remote frames of CAN."""
+"""Types of frames that are not data or remote frames of classic CAN."""
 BLF_NOTES: Final = (STATISTIC, DRIVER_ERROR)
 _STAMP: Final = struct.Struct("<L4xQ")  # flags, time
 _IN_10_US: Final = 1
-"""The flag of a time that is not in nanoseconds."""
+"""Flag of a time that is not in nanoseconds."""
 _BODY: Final = {1: 32, 2: 40}
-"""Where the body of an object begins, by the version of its header."""
+"""Offset of an object's body by the version of its header."""
 _ERROR_COUNT: Final = struct.Struct("<20xL")
 _COUNTERS: Final = struct.Struct("<2xBB")
 
 
 class _BlfReader(can.BLFReader):
-    """python-can's reader, with all error frames; it stops at objects without a size.
+    """python-can's reader with all error frames. It stops at objects without a size.
 
     Attributes:
-        tally: counts objects that report errors and are not frames.
-        apart: parses containers that hold only usual frames.
+        tally: counts of objects that report errors and are not frames.
+        apart: parser of containers that hold only usual frames.
     """
 
     tally: LogTally
@@ -244,7 +244,7 @@ class _BlfReader(can.BLFReader):
         yield from self._part(data, begin, len(data))
 
     def _part(self, data: bytes, begin: int, end: int) -> Iterator[can.Message]:
-        """Have python-can read some objects."""
+        """Let python-can read some objects."""
         try:
             yield from super()._parse_data(data[begin:end] if begin or end < len(data) else data)
         finally:
@@ -265,7 +265,7 @@ class _BlfReader(can.BLFReader):
         )
 
     def _note(self, item: bytes, kind: int) -> None:
-        """Note what an object says of errors that no frame shows."""
+        """Record a bus error in an object that no frame shows."""
         layout = _ERROR_COUNT if kind == STATISTIC else _COUNTERS
         text = ERRORS_COUNTED if kind == STATISTIC else COUNTERS_TOLD
         if any(layout.unpack_from(_body(item))):
@@ -278,7 +278,7 @@ def _body(item: bytes) -> bytes:
 
 
 def _objects(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Give place, size and type of each whole object; ValueError if one has no size."""
+    """Yield place, size and type of each whole object. Raise ValueError if one has no size."""
     at, last = 0, len(data) - _OBJECT.size
     while 0 <= (begin := data.find(_SIGNATURE, at, at + _SEARCHED)) <= last:
         _, _, _, size, kind = _OBJECT.unpack_from(data, begin)
@@ -291,10 +291,10 @@ def _objects(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _missing_end(file: BinaryIO) -> str:
-    """Return what is missing at the end of a log; empty if the log is complete.
+    """Return what is missing at the end of a log, empty if the log is complete.
 
     Args:
-        file: a log that python-can has read without an error; it is read again from its start.
+        file: log that python-can has read without an error. The file is read again from its start.
     """
     file.seek(0)
     _, header_bytes, _, declared = _FILE.unpack(file.read(_FILE.size))
@@ -311,13 +311,13 @@ def _missing_end(file: BinaryIO) -> str:
 
 
 def _has_end(file: BinaryIO) -> bool:
-    """Return whether the writer closed a log: only then its header has the size of the file."""
+    """Return whether the writer closed a log, because only then its header has the file size."""
     _, header_bytes, file_bytes, _ = _FILE.unpack(file.read(_FILE.size))
     return bool(file_bytes != header_bytes)
 
 
 def _contents(file: BinaryIO) -> Iterator[bytes | None]:
-    """Yield what is in each object of the file: of others than containers nothing, None if cut."""
+    """Yield the content of each container, empty for other objects, and None if it is cut off."""
     while head := file.read(_OBJECT.size):
         if len(head) < _OBJECT.size:
             yield None
@@ -342,7 +342,7 @@ def _content(body: bytes) -> bytes | None:
 
 
 def _count(data: bytes) -> tuple[int, bytes]:
-    """Return how many objects are whole, and the bytes behind them."""
+    """Return the number of whole objects, and the number of bytes after them."""
     count = at = 0
     for count, (begin, size, _) in enumerate(_objects(data), 1):  # noqa: B007 - counted
         at = begin + size
@@ -352,7 +352,7 @@ def _count(data: bytes) -> tuple[int, bytes]:
 # Log files that python-can writes: ASC, BLF, TRC and, with asammdf, MF4.
 
 _FD_FLAGS: Final = 0x1000
-"""A CAN FD frame in ASC; the bits above it say BRS and ESI."""
+"""Flag of a CAN FD frame in ASC. The bits above it are BRS and ESI."""
 
 _TRC_TYPES: Final = {
     (False, False): "FD",
@@ -367,17 +367,17 @@ _END: Final = "End TriggerBlock\n"
 
 
 _EXACT_US: Final = 1 << 51
-"""Below it a time in seconds is exact to the microsecond as a floating-point number."""
+"""Limit below which a time in seconds is exact to the microsecond as a floating-point number."""
 
 
 class _AscWriter:
-    """A writer that begins at a millisecond of local time; an earlier frame begins a new block.
+    """Writer that begins at a millisecond of local time. An earlier frame begins a new block.
 
     python-can's own writer dates the file with the time of writing, and writes 5 ms of a date as
     `.5`. It writes a frame from before the start with its absolute time.
 
     Args:
-        file: a text file; it is closed with the log.
+        file: text file, which is closed with the log.
     """
 
     def __init__(self, file: TextIO) -> None:
@@ -394,11 +394,11 @@ class _AscWriter:
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
 
     def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
-        """Write many frames at once; return False if that is not possible.
+        """Write many frames at once. Return False if that is not possible.
 
-        A frame takes 0.4 us; written one by one, it takes 6 us.
+        A frame takes 0.4 us. A frame that is written alone takes 6 us.
 
-        The caller must write the following one by one: error frames, a frame that begins another
+        The caller must write these items one by one: error frames, a frame that begins another
         block, and times that are not exact as floating-point numbers.
         """
         first_us, earliest_us = block.first_us, block.earliest_us
@@ -420,7 +420,7 @@ class _AscWriter:
         self._file.write(f"// {mark.text}\n")
 
     def flush(self) -> None:
-        """There is nothing but the file."""
+        """Do nothing, because all data are in the file already."""
 
     def stop(self) -> None:
         """End the log."""
@@ -457,7 +457,10 @@ def _event(message: can.Message) -> str:
 
 
 def _fd_event(message: can.Message, channel: int, ident: str, direction: str) -> str:
-    """Write the fields after the time; durations, bit timings and CRC are unknown, so 0."""
+    """Write the fields after the time.
+
+    Durations, bit timings and CRC are unknown, so they are 0.
+    """
     brs, esi = int(message.bitrate_switch), int(message.error_state_indicator)
     # 1000h FDF, 2000h BRS, 4000h ESI.
     flags = _FD_FLAGS * (1 + 2 * brs + 4 * esi)
@@ -469,14 +472,17 @@ def _fd_event(message: can.Message, channel: int, ident: str, direction: str) ->
 
 
 _FIRST_BLF_S: Final = 631_152_000
-"""1990-01-01; python-can takes a time before it for one that counts from zero."""
+"""Start of 1990. python-can takes a time before it for one that counts from zero."""
 
 _TRC_STEP_US: Final = 10_546_875
-"""2**-13 days: a multiple of it is exact as the fraction of a day that TRC begins with."""
+"""Step of 2**-13 days. A multiple is exact as the fraction of a day at the begin of a TRC file."""
 
 
 class _TrcWriter(can.TRCWriter):
-    """Begins at a multiple of `_TRC_STEP_US`: a date that the text holds to the microsecond."""
+    """Writer that begins at a multiple of `_TRC_STEP_US`.
+
+    The text can hold such a date to the microsecond.
+    """
 
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""
@@ -493,7 +499,7 @@ class _TrcWriter(can.TRCWriter):
         self.file.write(f";   {mark.text}\n")
 
     def flush(self) -> None:
-        """There is nothing but the file."""
+        """Do nothing, because all data are in the file already."""
 
     def _begin(self, at_us: int) -> None:
         if self.first_timestamp is None:
@@ -502,7 +508,7 @@ class _TrcWriter(can.TRCWriter):
 
 
 def _fd_trc_line(message: can.Message, number: int, begin_s: float) -> str:
-    """Write the line of a frame, which python-can reads but does not write."""
+    """Write the line of a frame. python-can reads such a line but does not write it."""
     kind = _TRC_TYPES[message.bitrate_switch, message.error_state_indicator]
     offset_ms = (message.timestamp - begin_s) * 1000
     ident = f"{message.arbitration_id:0{7 if message.is_extended_id else 4}X}"
@@ -514,10 +520,10 @@ def _fd_trc_line(message: can.Message, number: int, begin_s: float) -> str:
 
 
 class _BlfWriter(can.BLFWriter):
-    """A writer that begins at a full second; BLF cannot hold earlier frames.
+    """Writer that begins at a full second. BLF cannot hold earlier frames.
 
     Attributes:
-        early: number of earlier frames; these get the time of the beginning.
+        early: number of earlier frames. Such frames get the time of the beginning.
     """
 
     early = 0
@@ -554,10 +560,10 @@ class _BlfWriter(can.BLFWriter):
 
 
 class _Mf4Writer(can.MF4Writer):
-    """Is written as a whole at its end."""
+    """Writer of a file that is written as a whole at its end."""
 
     def flush(self) -> None:
-        """There is nothing to give yet."""
+        """Do nothing, because there are no data to pass yet."""
 
 
 _TEXT: Final[dict[log_file.LogFormat, Any]] = {
@@ -570,7 +576,7 @@ _BINARY: Final[dict[log_file.LogFormat, Any]] = {
 }
 
 _END_US: Final = 16_725_225_600_000_000
-"""The year 2500: dates of ASC and TRC go on to 9999, nanoseconds of BLF to 2554."""
+"""Limit of times in the year 2500. ASC and TRC end in 9999, nanoseconds of BLF in 2554."""
 
 _MARKS: Final = "marks of gaps and triggers"
 
@@ -613,7 +619,7 @@ class CanLogWriter:
         self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
 
     def write_block(self, block: TextBlock, /) -> bool:
-        """Add many frames at once; False where they are to be added one by one."""
+        """Add many frames at once. Return False if they must be added one by one."""
         writer = self._writer
         return isinstance(writer, _AscWriter) and writer.write_block(block, self._numbers.number)
 
@@ -625,7 +631,7 @@ class CanLogWriter:
             self._writer.mark(mark)
 
     def flush(self) -> None:
-        """Give what was added to the operating system; the end of some formats is still missing."""
+        """Pass all items to the operating system. The end of some formats is still missing."""
         self._writer.flush()
         self._file.flush()
 
@@ -639,7 +645,7 @@ class CanLogWriter:
                 self._file.close()
 
     def messages(self) -> list[str]:
-        """Report what the format could not hold."""
+        """Report the items that the format could not hold."""
         named = self._path.name
         said = [f"{named}: {count} {what} left out" for what, count in self._passed_over.items()]
         said += self._numbers.messages(named)
@@ -649,7 +655,7 @@ class CanLogWriter:
 
 
 class _Text(io.TextIOWrapper):
-    """A text file that knows its path, as the header of TRC wants it."""
+    """A text file that knows its path, which the header of TRC needs."""
 
     def __init__(self, file: Any, name: str) -> None:
         super().__init__(file, "utf-8", newline="")
@@ -661,7 +667,7 @@ class _Text(io.TextIOWrapper):
 
 
 def _not_held(record: Record, kind: log_file.LogFormat) -> str:
-    """Return what a format cannot hold; empty if it can."""
+    """Return the properties that a format cannot hold, empty if it can hold all."""
     if record.at_us >= _END_US:
         return "frames of the year 2500 and later"
     if isinstance(record.frame, ErrorFrame):

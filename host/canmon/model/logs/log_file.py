@@ -1,4 +1,4 @@
-"""Log files: their formats by name, their times, opened with or without gzip.
+"""Log files, with their formats by name, their times, and opening with or without gzip.
 
 >>> to_us(1.25), to_us(0)
 (1250000, 0)
@@ -46,18 +46,17 @@ _SAID: Final = re.compile(
     r"|(?P<back>\S{1,32}) is back after (?P<s>[0-9]{1,12})\.(?P<us>[0-9]{6}) s"
     rf"|{DROP_COUNT} dropped (?P<dropped>[0-9]{{1,15}}) CAN frames? on .{{1,100}}"
 )
-"""What the functions below write, and candump of what its socket dropped; other comments are no
-marks."""
+"""Comments that are marks, by the functions below, and candump's report of dropped frames."""
 
 
 class Mark(NamedTuple):
     """An event that is not a frame, at its place among the frames.
 
     Attributes:
-        at_us: time of the event; by the clock of this machine if no frame gives it.
-        event: its kind, one of those above.
+        at_us: time of the event. It is by the clock of this machine if no frame gives the time.
+        event: kind of the event, one of the constants above.
         text: one line of text for display, in ASCII.
-        channel: bus that the event is about; empty for all buses.
+        channel: bus of the event, empty for all buses.
         frames: number of lost frames.
         away_us: time for which the bus was away.
     """
@@ -70,7 +69,7 @@ class Mark(NamedTuple):
     away_us: int = 0
 
     def json(self) -> str:
-        """Write it as an object; members that say nothing are left out."""
+        """Return the mark as an object. Members without information are left out."""
         import json  # noqa: PLC0415 - seldom wanted
 
         said: dict[str, object] = {"v": VERSION, "ev": self.event, "t": self.at_us / 1e6}
@@ -81,29 +80,29 @@ class Mark(NamedTuple):
 
 
 def dropped(at_us: int, frames: int) -> Mark:
-    """Record that frames were lost here."""
+    """Return a mark that frames were lost here."""
     return Mark(at_us, DROP, f"{frames} frames were lost", frames=frames)
 
 
 def gone(at_us: int, channel: str, why: str) -> Mark:
-    """Record that a bus went away; `why` may begin with its name."""
+    """Return a mark that a bus went away. `why` may begin with the name of the bus."""
     reason = _plain(why.removeprefix(f"{channel}: "))
     return Mark(at_us, GONE, f"{_plain(channel)} is gone: {reason}", channel)
 
 
 def back(at_us: int, channel: str, away_us: int) -> Mark:
-    """Record that a bus is back."""
+    """Return a mark that a bus is back."""
     away = f"{away_us // 1_000_000}.{away_us % 1_000_000:06d}"
     return Mark(at_us, BACK, f"{_plain(channel)} is back after {away} s", channel, away_us=away_us)
 
 
 def triggered(at_us: int, why: str) -> Mark:
-    """Record the trigger of a recording."""
+    """Return a mark for the trigger of a recording."""
     return Mark(at_us, TRIGGER, f"trigger: {_plain(why)}")
 
 
 def read_mark(at_us: int, text: str) -> Mark | None:
-    """Return the mark that these words of a log stand for; None for other words.
+    """Return the mark for these words of a log, or None for other words.
 
     >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
     True
@@ -121,17 +120,17 @@ def read_mark(at_us: int, text: str) -> Mark | None:
 
 
 def _plain(text: str) -> str:
-    """Return text in one line of ASCII, as all formats can hold it."""
+    """Return text in one line of ASCII, which all formats can hold."""
     return " ".join(text.split()).encode("ascii", "backslashreplace").decode("ascii")
 
 
 # What a log holds besides frames: counted, so that nothing is lost silently.
 
 _KEPT: Final = 5
-"""Bad lines that are kept; the others are counted."""
+"""Number of bad lines that are kept. Further bad lines are only counted."""
 
 _SHOWN: Final = 60
-"""Characters of a bad line that are shown."""
+"""Number of characters of a bad line that are shown."""
 
 
 BAD_FRAMES: Final = "frames that CAN cannot have"
@@ -144,7 +143,7 @@ OTHER_OBJECTS: Final = "objects that are no frames"
 NO_TIME: Final = "frames with an invalid time"
 OTHER_PACKETS: Final = "packets of other links"
 _NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
-"""What a log may hold beside frames."""
+"""Items that a log may hold in addition to frames."""
 
 
 _FOREIGN: Final = {
@@ -154,16 +153,16 @@ _FOREIGN: Final = {
     "ID,Data Bytes": "a list of frames without times",
     "@ TEXT @": "a trace of CARBUS Analyzer",
 }
-"""Words among the first lines of other programs' logs, and whose they are."""
+"""Words in the first lines of logs of other programs, with the names of these programs."""
 
 
 @dataclass(slots=True)
 class _BadLines:
-    """Lines that are none of their log.
+    """Lines that are invalid in their log.
 
     Attributes:
-        count: how many.
-        first: number and text of the first few.
+        count: number of bad lines.
+        first: number and text of the first few lines.
     """
 
     count: int = 0
@@ -176,7 +175,7 @@ class _BadLines:
             self.first.append((number, line))
 
     def messages(self, name: str) -> list[str]:
-        """Report the counts, one line each; nothing if there are none."""
+        """Report the counts, one line each, or nothing if there are none."""
         texts = [line for _, line in self.first]
         for begin, program in _FOREIGN.items():
             if any(begin in text for text in texts):
@@ -192,18 +191,18 @@ class _BadLines:
 
 @dataclass(slots=True)
 class LogTally:
-    """What was not returned as a frame.
+    """Counts of items that were not returned as frames.
 
     Attributes:
         bad_lines: invalid lines.
         passed_over: number of skipped items by kind: frames that are not read, such as CAN XL, and
             items that are not frames (`_NO_FRAMES`).
         lost: frames that the recorder reports as lost.
-        untimed: frames without a time in the log; they get that of the previous frame.
-        undated: number of unreadable dates; times after such a date count from 0.
+        untimed: frames without a time in the log. Such a frame gets the time of the previous frame.
+        undated: number of unreadable dates. Times after such a date count from 0.
         shifted_us: offset added to the times of the log.
         errors_told: number of items that are not frames and report bus errors, by kind.
-        without_errors: why the log cannot contain error frames; empty if it can.
+        without_errors: reason why the log cannot contain error frames, empty if it can.
     """
 
     bad_lines: _BadLines = field(default_factory=_BadLines)
@@ -217,16 +216,16 @@ class LogTally:
 
     @property
     def unread(self) -> int:
-        """Lines and frames that came and were not returned."""
+        """Number of lines and frames that arrived and were not returned."""
         frames = sum(n for what, n in self.passed_over.items() if what not in _NO_FRAMES)
         return self.bad_lines.count + frames
 
     def messages(self, name: str) -> list[str]:
-        """Report the counts, one line each; nothing if all was returned."""
+        """Report the counts, one line each, or nothing if all items were returned."""
         return self.losses(name) + self.remarks(name)
 
     def losses(self, name: str) -> list[str]:
-        """Report what was lost or could not be read."""
+        """Report items that were lost or could not be read."""
         said = self.bad_lines.messages(name) + self._passed_over(name, no_frames=False)
         return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])
 
@@ -278,18 +277,18 @@ COMPRESSED: Final = ".gz"
 
 
 class LogFormatError(ValueError):
-    """A name that tells no format."""
+    """A file name that indicates no format."""
 
 
 class LogError(ValueError):
-    """A file that is no log or ends in the middle, or a format that cannot be written here."""
+    """A file that is not a log, or is truncated, or a format that cannot be written here."""
 
 
 def log_format(path: Path) -> LogFormat:
     """Return the format of a file.
 
     Raises:
-        LogFormatError: its name does not tell.
+        LogFormatError: the name of the file indicates no format.
 
     >>> log_format(Path("run.asc.gz")).value, log_format(Path("run.gvret.csv")).value
     ('asc', 'gvret')
@@ -302,12 +301,12 @@ def log_format(path: Path) -> LogFormat:
 
 
 def reader_of(kind: LogFormat) -> Any:
-    """Return the class that reads a format."""
+    """Return the reader class of a format."""
     return _class_at(_FORMATS[kind][1])
 
 
 def writer_of(kind: LogFormat) -> Any:
-    """Return the class that writes a format."""
+    """Return the writer class of a format."""
     return _class_at(_FORMATS[kind][2])
 
 
@@ -317,7 +316,7 @@ def _class_at(place: str) -> Any:
 
 
 def log_ending(path: Path) -> str:
-    """Return the end of a file's name, as `.log`, `.gvret.csv` or `.asc.gz`."""
+    """Return the end of a file's name, such as `.log`, `.gvret.csv` or `.asc.gz`."""
     suffixes = path.suffixes
     count = 1 + (path.suffix.lower() == COMPRESSED)
     longer = "".join(suffixes[-count - 1 :])
@@ -327,18 +326,18 @@ def log_ending(path: Path) -> str:
 
 
 END_S: Final = 10**12
-"""Twelve digits of seconds: what a candump log may have in front of the dot."""
+"""Limit of seconds, because a candump log may have twelve digits in front of the dot."""
 
 
 def to_us(seconds: float) -> int:
-    """Return microseconds; ValueError if that is no time: nan, below 0, `END_S` or more."""
+    """Return microseconds. Raise ValueError for an invalid time: nan, below 0, `END_S` or more."""
     if not 0 <= seconds < END_S:
         raise ValueError(f"{seconds!r} s is not 0 to below 1e12 s")
     return round(seconds * 1e6)
 
 
 def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
-    """Open a file for reading or writing, through gzip where its name says so."""
+    """Open a file for reading or writing, through gzip if its name requires this."""
     if path.suffix.lower() != COMPRESSED:
         return path.open(mode)
     import gzip  # noqa: PLC0415 - seldom wanted
@@ -349,11 +348,12 @@ def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
 def read_blocks(file: BinaryIO, path: Path, block_bytes: int) -> Iterator[bytes]:
     """Read an open text log in pieces of about `size` bytes.
 
-    Of a truncated or damaged compressed file, everything readable is returned.
+    For a truncated or damaged compressed file, everything readable is returned.
 
     Raises:
-        LogError: raised after that; the message names where it is truncated or damaged.
-        OSError: it cannot be read.
+        LogError: the file is truncated or damaged, raised after the readable part. The message
+            contains the place.
+        OSError: the file cannot be read.
     """
     pieces, held, lines = list[bytes](), 0, 0
     try:

@@ -1,4 +1,4 @@
-r"""Read frames from log files, and from logs that arrive in pieces.
+r"""Readers of frames in log files, and in logs that arrive in pieces.
 
 >>> lines = WholeLines()
 >>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
@@ -55,7 +55,7 @@ HEAD: Final = 1 << 13
 """Number of bytes of a text from which the kind of its time stamps is determined."""
 
 _LATE_US: Final = 10_000
-"""Frames of several buses are shown out of order by less."""
+"""Time below which frames of several buses are shown out of order."""
 
 _STAMP: Final = (
     r"\((?:(-?)([0-9]{1,12})|([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}))"
@@ -72,7 +72,7 @@ _PRINTED: Final = re.compile(
     r"((?: {1,4}[0-9a-f]{2}(?!\S))*)(?:\s+'\w+')?(?:\s+Channel: (\S{1,32}))?",
     re.ASCII,
 )
-"""What python-can prints, and its logger writes to a file with any other ending."""
+"""Lines that python-can prints, and that its logger writes to a file with any other ending."""
 _SERIAL: Final = re.compile(rf"(?:{_STAMP})?\S+  [<>]  .*", re.ASCII)
 _WORDS: Final = re.compile(r"\t+[a-z]+-[a-z-]+(?:\{.*\})?\s*", re.ASCII)
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
@@ -82,17 +82,17 @@ _SPANS: Final = re.compile(
 _DIGITS: Final = re.compile(r"[0-9A-Fa-f]{2}")
 _BITS: Final = re.compile(r"[01]{8}")
 _SWAPPED: Final = "`"
-"""Between bytes that candump shows from the last to the first."""
+"""Sign between bytes that candump shows from the last to the first."""
 _ABSOLUTE: Final = 10
-"""Digits of the seconds since the epoch; with fewer it is a span of time."""
+"""Number of digits of seconds since the epoch. With fewer digits, it is a span of time."""
 
 
 _WRAP_US: Final = 1 << 32
-"""So far a counter of microseconds with 32 bits goes."""
+"""Range of a 32-bit counter of microseconds."""
 
 
 class ScreenClock:
-    """Computes the time of a frame from the stamp before it.
+    """Clock that computes the time of a frame from the stamp before the frame.
 
     Args:
         deltas: whether spans count from the previous frame (`-t d`), or from the first
@@ -109,7 +109,10 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return the clock of a text: of deltas, where its first spans fall often or by much."""
+        """Return the clock of a text.
+
+        Its stamps are deltas if the first spans fall often or by much.
+        """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
         falls = [before - after for before, after in pairwise(spans) if after < before]
@@ -119,7 +122,7 @@ class ScreenClock:
         """Return the time of a stamp; without a stamp, the time of the previous frame.
 
         Raises:
-            ValueError: a date that does not exist.
+            ValueError: the date does not exist.
         """
         micros = int(f"{fraction or '':0<6.6}")
         if date is not None:
@@ -148,7 +151,7 @@ class ScreenClock:
 
 
 def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
-    """Return a frame, what was counted or is no fault instead, or None for a bad line."""
+    """Return a frame, a counted or harmless item, or None for a bad line."""
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
     if match is None:
@@ -171,7 +174,7 @@ def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record
 
 
 def _lost_frames(comment: str) -> int:
-    """Return the number of lost frames in a comment of a log; 0 for any other comment.
+    """Return the number of lost frames in a comment of a log, or 0 for any other comment.
 
     >>> _lost_frames("# 12 frames were lost"), _lost_frames("# a note")
     (12, 0)
@@ -220,7 +223,7 @@ def _printed(match: re.Match[str], clock: ScreenClock) -> Record | None:
 
 
 def _notation(length: int, shown: str) -> str:
-    """Return data in the notation of a log; ignore what follows them."""
+    """Read data in the notation of a log. Ignore the text after the data."""
     if shown.startswith("remote request"):
         return f"R{length}"
     words = shown.split()
@@ -233,14 +236,14 @@ def _notation(length: int, shown: str) -> str:
 
 
 Item = Record | Mark
-"""What a log holds, in its order."""
+"""An item of a log, in its order."""
 
 LONGEST: Final = 1 << 20
-"""Bytes; of a longer line the beginning is kept, and no line of a log is so long."""
+"""Number of bytes that are kept of a longer line. No line of a log is that long."""
 
 
 class WholeLines:
-    """Holds back an incomplete line, in time and memory that do not grow with its pieces."""
+    """Buffer of an incomplete line. Time and memory do not grow with the number of pieces."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -258,7 +261,7 @@ class WholeLines:
         return whole
 
     def finish(self) -> bytes:
-        """Return a last line without LF."""
+        """Return a last line that has no LF."""
         rest = b"".join(self._pieces)
         self._pieces, self._held = [], 0
         return rest
@@ -275,26 +278,26 @@ _COMMENTS: Final = ("#", ";", "//")
 _LINE: Final = re.compile(
     r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
 )
-"""A line as `candump -L` writes it, with any frame."""
+"""Pattern of a line as `candump -L` writes it, with any frame."""
 _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 
 
 def parse_log_line(
     line: str, number: int, tally: LogTally, clock: ScreenClock | None = None
 ) -> Record | None:
-    """Parse a line; return None if it holds no frame, and count the reason in the tally.
+    """Parse a line. Return None if it holds no frame, and count the reason in the tally.
 
-    In addition to the present output of `candump -L`, it reads variants that other programs write:
-    stamps in nanoseconds or with fewer digits, a direction after the frame, the raw length code
-    after eight bytes, and error frames with fewer than eight bytes.
+    In addition to the present output of `candump -L`, the function reads variants that other
+    programs write: stamps in nanoseconds or with fewer digits, a direction after the frame, the raw
+    length code after eight bytes, and error frames with fewer than eight bytes.
 
     Empty lines and comments (`#`, `;`, `//`) hold no frame, and are not errors. If a comment
-    written by canmon reports lost frames, these are counted.
+    written by canmon reports lost frames, these frames are counted.
 
     Args:
-        line: without its LF.
+        line: line without its LF.
         number: number of the line, from 1.
-        tally: counts items that are not frames.
+        tally: counts of items that are not frames.
         clock: clock for the lines of a screen.
     """
     text = line.strip()
@@ -308,7 +311,7 @@ def parse_log_line(
 
 
 def _parsed(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
-    """Return a frame, what was counted instead, or None for a bad line."""
+    """Return a frame, a counted item, or None for a bad line."""
     if text.startswith("{"):
         return parse_json_line(text, tally)
     if match := _LINE.fullmatch(text):
@@ -317,7 +320,7 @@ def _parsed(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record
 
 
 def _logged(match: re.Match[str], tally: LogTally) -> Record | str | None:
-    """Return what a line of `candump -L` says."""
+    """Return the frame of a line of `candump -L`."""
     seconds, fraction, channel, notation, direction = match.groups()
     if _XL.fullmatch(notation):
         tally.passed_over[CAN_XL] += 1
@@ -334,7 +337,7 @@ _USUAL: Final = re.compile(
     r"#((?:[0-9A-Fa-f]{2}){0,8})(?: ([RT]))?\r?$",
     re.ASCII | re.MULTILINE,
 )
-"""A line with a data frame, as candump writes it: nearly all are so."""
+"""Pattern of a line with a data frame as candump writes it, which nearly all lines match."""
 
 
 def is_usual(line: str) -> bool:
@@ -343,20 +346,20 @@ def is_usual(line: str) -> bool:
 
 
 def holds_frame(line: str) -> bool:
-    """Return whether a line is one of `candump -L` without a CAN FD frame or a mark."""
+    """Return whether a line is from `candump -L`, without a CAN FD frame or a mark."""
     return "##" not in line and _LINE.fullmatch(line.strip()) is not None
 
 
 class LogLines:
-    """A decoder of a text log: `push` received bytes, and call `finish` at the end.
+    """Decoder of a text log: `push` received bytes, and call `finish` at the end.
 
-    A line with bytes outside ASCII is invalid; such bytes never raise an exception.
+    A line with bytes outside ASCII is invalid. Such bytes never raise an exception.
 
     Attributes:
-        tally: counts items that are not frames.
+        tally: counts of items that are not frames.
         marks: marks among the frames that were returned last, each with the number of these frames
             before it.
-        number: number of lines.
+        number: number of lines read.
     """
 
     def __init__(self) -> None:
@@ -366,7 +369,7 @@ class LogLines:
 
     @property
     def deltas(self) -> bool:
-        """Whether stamps count from frame to frame: only all of the log tells the time."""
+        """Whether stamps count from frame to frame, so that times need all of the log."""
         return self._clock is not None and self._clock.deltas
 
     def push(self, data: bytes, /) -> list[Record]:
@@ -375,12 +378,12 @@ class LogLines:
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
-        """Skip lines that hold frames according to `holds_frame`, and were read as columns.
+        """Skip lines that hold frames by `holds_frame`, and that were read as columns.
 
         Args:
             lines: number of lines.
-            latest_us: time of the last frame in them; None if there was no frame.
-            unusual: whether one of them was not usual according to `is_usual`.
+            latest_us: time of the last frame in the lines, or None if there was no frame.
+            unusual: whether one of the lines was not usual according to `is_usual`.
         """
         self.number += lines
         if unusual:
@@ -388,7 +391,7 @@ class LogLines:
         self._latest_us = self._latest_us if latest_us is None else latest_us
 
     def finish(self) -> list[Record]:
-        """Return the frame of a last line without LF."""
+        """Return the frame of a last line that has no LF."""
         rest, self.marks = self._whole.finish(), []
         return self._frames(rest.decode("latin-1")) if rest else []
 
@@ -414,7 +417,7 @@ class LogLines:
         return records
 
     def _timed(self, mark: Mark, at: int, records: list[Record]) -> Mark:
-        """Give a mark that has no time that of the frame before it; the first, of that behind."""
+        """Give a mark without a time the time of the frame before it, or after it at the start."""
         if mark.at_us:
             return mark
         first_us = records[0].at_us if records else 0
@@ -422,7 +425,10 @@ class LogLines:
 
 
 def _parse_json_mark(text: str) -> log_file.Mark | None:
-    """Return the mark that an event is; its time is 0 where it has none; None for others."""
+    """Return the mark for an event, or None for other events.
+
+    The time of the mark is 0 if the event has none.
+    """
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
     try:
@@ -437,14 +443,14 @@ def _parse_json_mark(text: str) -> log_file.Mark | None:
 
 
 def _mark(text: str) -> Mark | None:
-    """Return the mark that a comment or an event is, without a time where it has none."""
+    """Return the mark for a comment or an event, without a time if it has none."""
     if text.startswith(("#", DROP_COUNT)):
         return read_mark(0, text.removeprefix("#"))
     return _parse_json_mark(text) if text.startswith("{") else None
 
 
 def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:
-    """Return frames with marks among them, each after a number of frames."""
+    """Return frames with marks among them. Each mark follows a number of frames."""
     if not marks:
         return records
     items, begin = list[Item](), 0
@@ -455,7 +461,7 @@ def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Seque
 
 
 def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
-    """Return the frames of what `_USUAL` found; made without the constructors, for speed."""
+    """Return the frames that `_USUAL` found. They are made without constructors, for speed."""
     records: list[Record] = []
     add, new, unhex = records.append, tuple.__new__, bytes.fromhex
     second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()
@@ -471,18 +477,18 @@ def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Reco
 
 
 BLOCK_BYTES: Final = 1 << 13
-"""So few frames at once that the garbage collector seldom meets them."""
+"""Size of a block. With so few frames at once, the garbage collector seldom examines them."""
 
 
 class LogReader(Protocol):
-    """An iterable of frames; it reads while it is iterated, from the beginning each time.
+    """An iterable of frames that reads during the iteration, from the beginning each time.
 
     Attributes:
-        tally: counts items that are not frames.
+        tally: counts of items that are not frames.
 
     Raises:
         OSError: during iteration: the file cannot be read.
-        LogError: during iteration: the content does not match the file's name.
+        LogError: during iteration: the content does not match the name of the file.
     """
 
     tally: LogTally
@@ -494,10 +500,10 @@ class LogReader(Protocol):
 
 
 def read_log(path: Path) -> LogReader:
-    """Return a reader of a log file; nothing is opened yet.
+    """Return a reader of a log file. The file is not opened yet.
 
     Raises:
-        LogFormatError: the file's name tells no format.
+        LogFormatError: the name of the file indicates no format.
     """
     kind = log_file.log_format(path)
     reader: LogReader = log_file.reader_of(kind)(path, kind)
@@ -505,7 +511,7 @@ def read_log(path: Path) -> LogReader:
 
 
 class TextLogReader:
-    """A reader of a log in text."""
+    """Reader of a text log."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self.tally = path, LogTally()
@@ -530,14 +536,14 @@ class TextLogReader:
 
 
 _MOST_MARKS: Final = 1_000
-"""Between two frames: more are a damaged log."""
+"""Number of marks between two frames above which a log is damaged."""
 
 
 class _LineParser(Protocol):
-    """Reads the lines of one log, in their order."""
+    """Reader of the lines of one log, in their order."""
 
     def read(self, line: str, tally: LogTally, /) -> Record | str | None:
-        """Return a frame; another item that the line contains; or None for an invalid line.
+        """Return a frame, another item of the line, or None for an invalid line.
 
         Raises:
             ValueError: the file is not a log of this format.
@@ -548,8 +554,8 @@ class LineLogReader:
     """A reader of a log whose header defines the format of its lines.
 
     Attributes:
-        comments: beginnings of the lines that may be marks.
-        make_lines: makes the parser of the lines.
+        comments: beginnings of lines that may be marks.
+        make_lines: function that makes the parser of the lines.
     """
 
     comments: tuple[str, ...] = ()
@@ -563,7 +569,7 @@ class LineLogReader:
         return (item for item in self.items() if isinstance(item, Record))
 
     def items(self) -> Iterator[Item]:
-        """Read the file, with the marks among its frames: they have the time of the next one."""
+        """Read the file with the marks among its frames. A mark has the time of the next frame."""
         tally = self.tally = LogTally()
         lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=_MOST_MARKS), 0
         for number, line in enumerate(self._lines(), 1):
@@ -585,7 +591,7 @@ class LineLogReader:
         yield from (mark._replace(at_us=at_us) for mark in marks)
 
     def _lines(self) -> Iterator[str]:
-        """Return the lines: in UTF-8, or else in Latin-1."""
+        """Return the lines, which are in UTF-8, or else in Latin-1."""
         whole = WholeLines()
         with log_file.open_log(self._path) as file:
             first = True
@@ -602,7 +608,7 @@ _NUMBERLESS: Final = "canX"
 
 
 def bus_name(number: str) -> str:
-    """Return the name of a bus by its number from 1; ValueError if it is not a number.
+    """Return the name of a bus by its number from 1. Raise ValueError for other texts.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

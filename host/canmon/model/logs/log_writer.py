@@ -1,4 +1,4 @@
-"""Frames into a log file."""
+"""Writers of frames into a log file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MARKS: Final = "marks of gaps and triggers left out"
 
 
 class LogWriter(Protocol):
-    """A log file that is written."""
+    """A log file that is being written."""
 
     def write(self, record: Record, /) -> None:
         """Add a frame."""
@@ -28,26 +28,26 @@ class LogWriter(Protocol):
         """Add an item other than a frame, if the format can hold it."""
 
     def flush(self) -> None:
-        """Pass all added items to the operating system: they are readable if nothing follows.
+        """Pass all added items to the operating system. They are readable if nothing follows.
 
-        With `in_blocks` this makes the file larger: call it rarely.
+        With `in_blocks`, this makes the file larger. Call it rarely.
         """
 
     def close(self) -> None:
-        """End the log; closing twice is no error."""
+        """End the log. You may close a log twice."""
 
     def messages(self) -> list[str]:
-        """Report what the format could not hold, one line each."""
+        """Report the items that the format could not hold, one per line."""
 
 
 class TextBlock(Protocol):
-    """Many frames that write themselves as lines at once; `column_text` implements it.
+    """Many frames that write themselves as lines at once. `column_text` implements this protocol.
 
     Attributes:
         first_us: time of the first frame.
         last_us: time of the last frame.
-        earliest_us: the least time.
-        latest_us: the greatest time.
+        earliest_us: least time of a frame.
+        latest_us: greatest time of a frame.
         errors: whether there are error frames.
     """
 
@@ -58,17 +58,20 @@ class TextBlock(Protocol):
     errors: bool
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
 
     def log_lines(self) -> str:
-        """Write them as `log_line` does, each line with its end."""
+        """Return the frames as `log_line` writes them, each line with its end."""
 
     def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
-        """Write them as `AscWriter` does; it tells the numbers of buses, from 0."""
+        """Return the frames as `AscWriter` writes them.
+
+        `number` returns numbers of buses, from 0.
+        """
 
 
 def in_blocks(path: Path) -> bool:
-    """Return whether a log is compressed, block by block."""
+    """Return whether a log is compressed block by block."""
     return (
         path.suffix.lower() == log_file.COMPRESSED
         or log_file.log_format(path) is log_file.LogFormat.BLF
@@ -76,12 +79,12 @@ def in_blocks(path: Path) -> bool:
 
 
 def write_log(path: Path) -> LogWriter:
-    """Begin a log; a file that exists is replaced.
+    """Begin a log. An existing file is replaced.
 
     Raises:
-        LogFormatError: the file's name has no known format.
-        OSError: it cannot be written.
-        LogError: its format needs a library that is not installed.
+        LogFormatError: the name of the file has no known format.
+        OSError: the file cannot be written.
+        LogError: the format needs a library that is not installed.
     """
     kind = log_file.log_format(path)
     writer: LogWriter = log_file.writer_of(kind)(path, kind)
@@ -89,7 +92,7 @@ def write_log(path: Path) -> LogWriter:
 
 
 def log_line(record: Record) -> str:
-    """Write a frame as `candump -L` does; what we sent ends in T, as `candump -L -x` has it."""
+    """Return a frame as `candump -L` writes it. A sent frame ends in T, as with `candump -L -x`."""
     at_us, channel, frame, sent = record
     end = " T" if sent else ""
     return f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d}) {channel} {frame}{end}"
@@ -103,7 +106,7 @@ _LINES: Final = {
 
 
 def comment(mark: log_file.Mark) -> str:
-    """Write a mark as programs pass it over that read candump's logs."""
+    """Return a mark as a comment that programs skip when they read candump's logs."""
     return f"# {mark.text}"
 
 
@@ -111,7 +114,7 @@ _MARKS: Final = {log_file.LogFormat.CANDUMP: comment, log_file.LogFormat.JSONL: 
 
 
 class TextLogWriter:
-    """A log in lines: candump's, JSON or CSV."""
+    """A log in lines, in the format of candump, JSON or CSV."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._file, self._lines = log_file.open_log(path, "wb"), list[str]()
@@ -124,7 +127,7 @@ class TextLogWriter:
             self._give()
 
     def write_block(self, block: TextBlock, /) -> bool:
-        """Add many frames at once; False where they are to be added one by one."""
+        """Add many frames at once. Return False if they must be added one by one."""
         if self._kind is not log_file.LogFormat.CANDUMP:
             return False
         self._give()
@@ -136,7 +139,7 @@ class TextLogWriter:
         self._lines.append(_MARKS[self._kind](mark))
 
     def flush(self) -> None:
-        """Give what was added to the operating system."""
+        """Pass all items to the operating system."""
         self._give()
         self._file.flush()
 
@@ -149,7 +152,7 @@ class TextLogWriter:
                 self._file.close()
 
     def messages(self) -> list[str]:
-        """Nothing: these formats hold all there is."""
+        """Return no messages, because these formats hold all items."""
         return []
 
     def _row(self, record: Record) -> str:
@@ -161,7 +164,7 @@ class TextLogWriter:
 
 
 class CsvLogWriter(TextLogWriter):
-    """Rows below a header; they do not name their bus."""
+    """Rows below a header. The rows do not name their bus."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
@@ -174,11 +177,11 @@ class CsvLogWriter(TextLogWriter):
         super().write(record)
 
     def mark(self, mark: log_file.Mark, /) -> None:
-        """Count it: readers of python-can take each row for a frame."""
+        """Count a mark, because readers of python-can read each row as a frame."""
         self._marks += 1
 
     def messages(self) -> list[str]:
-        """Report which buses became one, and what was left out."""
+        """Report which buses were merged, and which items were left out."""
         said = [f"{self._name}: {self._marks} {MARKS}"] if self._marks else []
         if len(self._channels) > 1:
             buses = ", ".join(self._channels)
@@ -190,7 +193,7 @@ _NUMBERED: Final = re.compile(r"can([0-9]{1,3})")
 
 
 class BusNumbers:
-    """Numbers of buses in a log without names: `can3` is number 3, others take free numbers."""
+    """Numbers of buses in a log without names. `can3` is number 3, others take free numbers."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
@@ -206,7 +209,7 @@ class BusNumbers:
         return self._numbers[channel]
 
     def messages(self, name: str) -> list[str]:
-        """Report which bus became which number, if its name does not show it."""
+        """Report the number of each bus whose name does not show it."""
         return [
             f"{name}: {channel} became can{number}"
             for channel, number in self._numbers.items()
@@ -215,11 +218,11 @@ class BusNumbers:
 
 
 _GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
-"""Of SavvyCAN's own logs; older ones have no `Dir`."""
+"""Header of SavvyCAN's own logs. Older logs have no `Dir`."""
 
 
 class GvretLogWriter(TextLogWriter):
-    """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
+    """Rows as SavvyCAN reads them, with data frames of at most 8 bytes, and numbers of buses."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
@@ -227,7 +230,7 @@ class GvretLogWriter(TextLogWriter):
         self._lines.append(_GVRET_HEADER)
 
     def write(self, record: Record, /) -> None:
-        """Add a row, or count what such a log does not hold."""
+        """Add a row, or count an item that such a log cannot hold."""
         frame = record.frame
         if isinstance(frame, CanFrame) and not frame.remote:
             super().write(record)
@@ -237,11 +240,11 @@ class GvretLogWriter(TextLogWriter):
             self._left_out[f"{kind} frames left out"] += 1
 
     def mark(self, mark: log_file.Mark, /) -> None:
-        """Count it."""
+        """Count a mark."""
         self._left_out[MARKS] += 1
 
     def messages(self) -> list[str]:
-        """Report what was left out, and which bus has which number."""
+        """Report which items were left out, and the number of each bus."""
         said = [f"{self._name}: {count} {what}" for what, count in self._left_out.items()]
         return said + self._numbers.messages(self._name)
 

@@ -23,7 +23,7 @@ _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 
 
 def parse_frame(notation: str) -> AnyFrame:
-    """Parse a frame; WireError if it is invalid.
+    """Parse a frame. Raise WireError if it is invalid.
 
     The raw length code after eight bytes is ignored. An error frame may have fewer than eight
     bytes.
@@ -36,21 +36,21 @@ def parse_frame(notation: str) -> AnyFrame:
 
 
 LONGEST_NAME: Final = 32
-"""Characters of the name of a bus, as in the lines of a candump log."""
+"""Number of characters of a bus name, as in the lines of a candump log."""
 _NAME: Final = re.compile(rf"\S{{1,{LONGEST_NAME}}}", re.ASCII)
 
 _VERSION: Final = 1
 _LINE_EVENT: Final = "line"
-"""A line of a serial port, which no log of CAN holds."""
+"""Name of the event for a line of a serial port, which no CAN log holds."""
 
 
 def json_line(record: Record, more: str = "") -> str:
-    """Write a frame in JSON; `more` are further members, each with a comma before it.
+    """Return a frame as JSON. `more` contains further members, each with a comma before it.
 
     A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
     (hex). A remote frame has `rtr`, its length. An error frame has `err`: 1, and its class as `id`.
     A CAN FD frame has `fd`: 1, and `brs`: 1 and `esi`: 1 if these bits are set.
-    `{"v":1,"ev":"drop","n":12}` reports lost frames. A line of a serial port is an event, too.
+    `{"v":1,"ev":"drop","n":12}` reports lost frames. A line of a serial port is also an event.
 
     >>> json_line(Record(1_500_000, "can0", can.CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
@@ -72,7 +72,7 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Write an event in JSON; `more` are further members, each with a comma before it.
+    """Return an event as JSON. `more` contains further members, each with a comma before it.
 
     >>> from tickrig.host.canmon.model.decode.decoded import Decoded
     >>> line_json(LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc")))
@@ -87,7 +87,7 @@ def line_json(line: LineRecord, more: str = "") -> str:
 
 
 def drop_line(lost: int) -> str:
-    """Write that frames were lost.
+    """Return a line that reports lost frames.
 
     >>> drop_line(12)
     '{"v":1,"ev":"drop","n":12}'
@@ -111,7 +111,7 @@ def parse_json_line(text: str, tally: log_file.LogTally) -> Record | str | None:
 
 
 def _event(said: dict[str, Any], tally: log_file.LogTally) -> str:
-    """Take an event; one that is not known says nothing to us."""
+    """Read an event. An unknown event has no meaning."""
     if said["ev"] == log_file.DROP:
         tally.lost += max(0, int(said["n"]))
     elif said["ev"] == _LINE_EVENT:
@@ -141,7 +141,7 @@ def _frame(said: dict[str, Any]) -> AnyFrame:
 
 
 def _quoted(text: str) -> str:
-    """Quote a name; nearly all need no care."""
+    """Quote a name. Nearly all names need no escapes."""
     if text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
         return f'"{text}"'
     import json  # noqa: PLC0415 - slow
@@ -152,24 +152,24 @@ def _quoted(text: str) -> str:
 LOG_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
 UNNAMED: Final = "can0"
-"""What a bus without a name or number is called."""
+"""Name of a bus without a name or number."""
 
 _SENT: Final = ">"
 FD, FD_BRS, FD_ESI = "#", "!", "*"
-"""Behind the data of a row: base64 does not have them."""
+"""Signs after the data of a row, which base64 does not use."""
 
 
 class _Counting(Protocol):
-    """Tells the time of a counter of microseconds.
+    """Clock that returns the time for a counter of microseconds.
 
     Attributes:
-        shift_us: what it adds to the counter.
+        shift_us: offset added to the counter.
     """
 
     shift_us: int
 
     def counted_us(self, count: int) -> int:
-        """Return microseconds, not below 0."""
+        """Return microseconds of at least 0."""
 
 
 _DUMPED: Final = re.compile(
@@ -179,11 +179,11 @@ _DUMPED: Final = re.compile(
 
 
 def csv_row(record: Record) -> str:
-    """Write a frame below `LOG_HEADER`.
+    """Return a frame as a row below `LOG_HEADER`.
 
-    python-can's format does not contain the sender of a frame. Here a `>` after the data marks a
-    frame that this program sent; base64 does not use `>`, and python-can ignores it. The format
-    does not contain CAN FD either. Here a `#` in the same place marks a CAN FD frame, `!` marks
+    python-can's format does not contain the sender of a frame. Here, a `>` after the data marks a
+    frame that this program sent. base64 does not use `>`, and python-can ignores it. The format
+    does not contain CAN FD either. Here, a `#` in the same place marks a CAN FD frame, `!` marks
     BRS, and `*` marks ESI.
     """
     at_us, _, frame, sent = record
@@ -200,7 +200,7 @@ def csv_row(record: Record) -> str:
 
 
 _GVRET_BYTES: Final = 8
-"""So many columns of data there are, whatever the length."""
+"""Number of data columns, whatever the length is."""
 _WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"
 
 _GVRET_HEAD: Final = re.compile(r"time stamp,\s*id,\s*extended,.*", re.IGNORECASE)
@@ -212,7 +212,7 @@ _GVRET: Final = re.compile(
 
 
 def gvret_row(record: Record, bus: int) -> str:
-    """Write a data frame of at most 8 bytes below `GVRET_HEADER`.
+    """Return a data frame of at most 8 bytes as a row below `GVRET_HEADER`.
 
     >>> gvret_row(Record(1_500_000, "can0", can.CanFrame(0x705, b"7"), sent=True), 0)
     '1500000,00000705,false,Tx,0,1,37,00,00,00,00,00,00,00,'
@@ -229,7 +229,7 @@ def gvret_row(record: Record, bus: int) -> str:
 def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
     """Return a frame, the name of a header or of a counted item, or None.
 
-    The row itself shows its format: python-can, `canmon dump --csv`, or SavvyCAN.
+    The row itself shows its format, which is that of python-can, `canmon dump --csv`, or SavvyCAN.
     """
     if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
         return text
@@ -244,7 +244,7 @@ def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Rec
 
 
 def _of_savvycan(match: re.Match[str], tally: log_file.LogTally, clock: _Counting) -> Record:
-    """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
+    """Return the frame of a row. Some programs do not mark 29-bit CAN-IDs."""
     stamp, ident, extended, direction, bus, length, cells = match.groups()
     can_id, size = int(ident, 16), int(length)
     data = bytes(int(cell, 16) for cell in cells.split(",")[1 : size + 1])

@@ -1,11 +1,11 @@
-"""Captures of Wireshark, tshark and tcpdump: pcapng read and written, pcap read.
+"""Captures of Wireshark, tshark and tcpdump. pcapng is read and written, pcap is read.
 
-Blocks and options of a pcapng file (draft-ietf-opsawg-pcapng).
+The module reads and writes blocks and options of a pcapng file (draft-ietf-opsawg-pcapng).
 
 >>> _option(_COMMENT, b"hi").hex(), list(options("<", _option(_COMMENT, b"hi") + _END))
 ('0100020068690000', [(1, b'hi')])
 
-Frames as packets of a capture, as LINKTYPE_CAN_SOCKETCAN has them (tcpdump.org).
+Frames are packets of a capture, as in LINKTYPE_CAN_SOCKETCAN (tcpdump.org).
 
 A packet is a struct can_frame or canfd_frame of Linux with the identifier in network byte order.
 
@@ -48,7 +48,7 @@ _PACKET_BLOCK: Final = 6
 
 _COMMENT: Final = 1
 _APPLICATION: Final = 4
-"""Options of any block, and of a section: what wrote it."""
+"""Options of any block, and the option of a section that names the writing application."""
 
 _IF_NAME: Final = 2
 _TIME_RESOLUTION: Final = 9
@@ -61,17 +61,17 @@ _DROP_COUNT: Final = 4
 
 _DIRECTION: Final = 3
 _OUTBOUND: Final = 2
-"""Of the flags of a packet: the mask of its direction, and which it is."""
+"""Flags of a packet: the mask of its direction, and the value for sent packets."""
 
 _BLOCK_BYTES: Final = 12
-"""Of a block without content."""
+"""Number of bytes of a block without content."""
 
 _END: Final = bytes(4)
-"""Ends options."""
+"""End of options."""
 
 
 def _block(kind: int, content: bytes) -> bytes:
-    """Return a block in little-endian order; its content is a multiple of 4 bytes."""
+    """Return a block in little-endian order. The length of its content is a multiple of 4 bytes."""
     size = len(content) + _BLOCK_BYTES
     return struct.pack("<II", kind, size) + content + struct.pack("<I", size)
 
@@ -82,7 +82,7 @@ def _option(code: int, value: bytes) -> bytes:
 
 
 def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield codes and values, as far as they are whole; `order` is `<` or `>`."""
+    """Yield codes and values of whole options. `order` is `<` or `>`."""
     head, at = struct.Struct(f"{order}HH"), 0
     while at + head.size <= len(data):
         code, size = head.unpack_from(data, at)
@@ -94,12 +94,12 @@ def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 _LINK_TYPE: Final = 227
-"""LINKTYPE_CAN_SOCKETCAN."""
+"""Number of LINKTYPE_CAN_SOCKETCAN."""
 
 _EXTENDED: Final = 0x8000_0000
 _REMOTE: Final = 0x4000_0000
 _FDF: Final = 0x4
-"""Flag of a packet: it is of CAN FD, however short it was cut."""
+"""Flag of a packet that is a CAN FD frame, however short it was cut."""
 _XL: Final = 0x80
 
 # struct can_frame: id (4, network order), length (1), 3 reserved, 8 data; struct
@@ -115,7 +115,7 @@ _DATA_AT: Final = 8
 
 
 def packet(frame: AnyFrame) -> bytes:
-    """Return the packet of a frame: 16 bytes, of CAN FD 72."""
+    """Return the packet of a frame, with 16 bytes, or 72 bytes for CAN FD."""
     if isinstance(frame, can.FdFrame):
         flagged = frame.can_id | _EXTENDED * frame.extended
         return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
@@ -152,7 +152,7 @@ def _parse_packet(data: bytes) -> AnyFrame | str | None:
 # skips others. Times of any resolution are truncated to microseconds.
 
 _MOST_BYTES: Final = 1 << 24
-"""Of a block: more is damage."""
+"""Number of bytes of a block above which the file is damaged."""
 
 _CUT: Final = "it is cut"
 _READ_BYTES: Final = 1 << 16
@@ -166,11 +166,11 @@ class _Interface(NamedTuple):
     """An interface on which packets were captured.
 
     Attributes:
-        name: of the bus.
-        is_can: whether its packets are frames.
-        parts: units of its times per second.
-        offset_us: offset added to them.
-        snap_bytes: size to which packets are truncated; 0 for no limit.
+        name: name of the bus.
+        is_can: whether the packets of the interface are CAN frames.
+        parts: number of time units per second.
+        offset_us: offset added to the times.
+        snap_bytes: size to which packets are truncated, or 0 for no limit.
     """
 
     name: str
@@ -181,7 +181,7 @@ class _Interface(NamedTuple):
 
 
 class _Usual(NamedTuple):
-    """How a block with a classic data frame without options is taken apart, and what it has."""
+    """The layout of a block with a classic data frame without options, and its content."""
 
     layout: struct.Struct
     head: bytes
@@ -193,12 +193,13 @@ _BAD_PACKETS: Final = "packets that are no frames"
 
 
 class _PcapngReader:
-    """Parses the blocks of one file.
+    """Parser of the blocks of one file.
 
     Args:
         name: name of the file.
-        tally: counts what is not a frame.
-        marks: whether to return marks among the frames; the comment of a frame is a mark before it.
+        tally: counts of items that are not frames.
+        marks: whether to return marks among the frames. The comment of a frame is a mark before the
+            frame.
     """
 
     def __init__(self, name: str, tally: log_file.LogTally, marks: bool = False) -> None:
@@ -213,11 +214,11 @@ class _PcapngReader:
         """Yield frames.
 
         Args:
-            file: the file.
-            begun: the part already read.
+            file: open file.
+            begun: part of the file that was already read.
 
         Raises:
-            LogError: it is truncated or damaged, after all frames before that.
+            LogError: the file is truncated or damaged, raised after all frames before that place.
         """
         more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
         while more:
@@ -233,7 +234,7 @@ class _PcapngReader:
             )
 
     def _take(self, data: bytes, records: list[Item]) -> int:
-        """Add the frames of the blocks that are whole; return where the next one begins."""
+        """Add the frames of the whole blocks. Return the begin of the next block."""
         at, self._wanted = 0, _READ_BYTES
         while len(data) - (at := self._take_usual(data, at, records)) >= _BLOCK_BYTES:
             # A section may begin anywhere in a file, in the other byte order (files put one
@@ -252,7 +253,10 @@ class _PcapngReader:
         return at
 
     def _take_usual(self, data: bytes, at: int, records: list[Item]) -> int:
-        """Take classic data frames without options that follow each other: nearly all are so."""
+        """Read successive classic data frames without options.
+
+        Nearly all blocks are of this kind.
+        """
         usual, idents, names, at_us = self._usual, self._idents, self._names, -1
         if usual is None:
             return at
@@ -279,7 +283,7 @@ class _PcapngReader:
         return at
 
     def _ident(self, ident: bytes) -> tuple[int, bool] | None:
-        """Return the identifier of a data frame, and whether it is extended; None for others."""
+        """Return the identifier of a data frame and whether it is extended, or None for others."""
         frame = _parse_packet(ident + bytes(12))
         if not isinstance(frame, can.CanFrame) or frame.remote:
             return None
@@ -287,7 +291,7 @@ class _PcapngReader:
         return known
 
     def _begin(self, magic: bytes) -> None:
-        """Begin a section, in its byte order."""
+        """Begin a section with its byte order."""
         orders = {_ORDER_MAGIC.to_bytes(4, "little"): "<", _ORDER_MAGIC.to_bytes(4, "big"): ">"}
         if magic not in orders:
             self._damage = f"it has a section of no byte order ({magic.hex()})"
@@ -344,7 +348,10 @@ class _PcapngReader:
     def _add(
         self, number: int, count: int | None, data: bytes, size: int, records: list[Item]
     ) -> None:
-        """Add the frame of a packet; without a time it has that of the packet before."""
+        """Add the frame of a packet.
+
+        A packet without a time has the time of the previous packet.
+        """
         if number >= len(self._interfaces) or size > len(data):
             self._tally.passed_over[_BAD_PACKETS] += 1
             return
@@ -372,13 +379,13 @@ class _PcapngReader:
         records.append(Record(self._at_us, where.name, frame, sent == _OUTBOUND))
 
     def _drop(self, frames: int, records: list[Item]) -> None:
-        """Count frames that were lost."""
+        """Count lost frames."""
         self._tally.lost += frames
         if frames and self._marks:
             records.append(log_file.dropped(self._at_us, frames))
 
     def _comment(self, given: Iterator[tuple[int, bytes]], records: list[Item]) -> None:
-        """Add the marks that comments are; frames that were lost have a number, too."""
+        """Add the marks in comments. A mark of lost frames also has a number."""
         if not self._marks:
             return
         texts = (value.decode("utf-8", "replace") for code, value in given if code == _COMMENT)
@@ -387,7 +394,7 @@ class _PcapngReader:
 
 
 def _damage_of(size: int, rest: int, block: bytes) -> str:
-    """Return what is wrong with a block of which `present` bytes exist; empty if nothing is."""
+    """Return the fault of a block of which `present` bytes exist, empty if there is none."""
     if size < _BLOCK_BYTES or size % 4 or size > _MOST_BYTES:
         return f"it has a block of {size} bytes"
     return "it has a block whose sizes differ" if rest >= size and block[4:8] != block[-4:] else ""
@@ -409,7 +416,7 @@ _PCAP: Final = {
     bytes.fromhex("4d3cb2a1"): ("<", 1_000),
     bytes.fromhex("a1b23c4d"): (">", 1_000),
 }
-"""First bytes of a pcap file: byte order, and fractions of a second in a microsecond."""
+"""First bytes of a pcap file, which define byte order and fractions of a second per microsecond."""
 
 _HEAD_BYTES: Final = 24
 _LINK_TYPE_AT: Final = 20
@@ -451,7 +458,7 @@ class PcapReader:
             )
 
     def _packets(self, file: BinaryIO, order: str, parts: int) -> Iterator[Record]:
-        """Yield the frames of a pcap file, which names no bus."""
+        """Yield the frames of a pcap file, which does not name buses."""
         head = file.read(_HEAD_BYTES - 4)
         if len(head) < _HEAD_BYTES - 4:
             raise log_file.LogError(f"{self._path}: it is cut in its header")
@@ -495,7 +502,7 @@ _BLOCK_FRAMES: Final = 256
 
 
 class PcapngWriter:
-    """A capture; Wireshark shows a mark as a comment of the frame after it.
+    """A capture. Wireshark shows a mark as a comment of the frame after it.
 
     Raises:
         LogError: the file is pcap, the predecessor of pcapng, which does not name its buses.
@@ -537,18 +544,18 @@ class PcapngWriter:
             self._give()
 
     def mark(self, mark: log_file.Mark, /) -> None:
-        """Note it at the next frame, frames that were lost as a number too."""
+        """Record a mark at the next frame. For lost frames, also record their number."""
         if mark.event == log_file.DROP:
             self._options += _option(_DROP_COUNT, struct.pack("<Q", mark.frames))
         self._comments += _option(_COMMENT, mark.text.encode())
 
     def flush(self) -> None:
-        """Give what was added to the operating system."""
+        """Pass all items to the operating system."""
         self._give()
         self._file.flush()
 
     def close(self) -> None:
-        """End the capture; marks behind the last frame are in statistics of the first bus."""
+        """End the capture. Marks after the last frame are in statistics of the first bus."""
         if self._file.closed:
             return
         try:
@@ -560,7 +567,7 @@ class PcapngWriter:
             self._file.close()
 
     def messages(self) -> list[str]:
-        """Nothing: it holds all there is."""
+        """Return no messages, because a capture holds all items."""
         return []
 
     def _begin(self, channel: str) -> int:
@@ -585,5 +592,5 @@ class PcapngWriter:
 
 
 def _swapped(number: int) -> int:
-    """Return a number whose little-endian bytes are those of another one in network order."""
+    """Return a number whose little-endian bytes are those of another number in network order."""
     return int.from_bytes(number.to_bytes(4, "big"), "little")

@@ -1,4 +1,4 @@
-"""Frames in traces of benches and of ports (docs/reference/bench/trace.md)."""
+"""Frames in the traces of benches and of ports (docs/reference/bench/trace.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
 class TraceLogWriter:
-    """A trace of one bus, as a host sees it: that of the first frame; its times begin with it."""
+    """A trace of the bus of the first frame, as a host sees it. Its times begin with this frame."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._file, self._name = log_file.open_log(path, "wb"), path.name
@@ -36,7 +36,7 @@ class TraceLogWriter:
         self._left_out: Counter[str] = Counter()
 
     def write(self, record: Record, /) -> None:
-        """Add a frame; one that comes late is not before its last."""
+        """Add a frame. A late frame gets at least the time of the last frame."""
         if not self._channel:
             self._begin(record)
         if record.channel != self._channel or not isinstance(record.frame, CanFrame):
@@ -48,11 +48,11 @@ class TraceLogWriter:
         self._put(BenchRecord(self._latest_us, _name(self._channel), mark, record.frame).encode())
 
     def mark(self, mark: LogMark, /) -> None:
-        """Count it: a trace has frames alone."""
+        """Count a mark, because a trace holds only frames."""
         self._left_out[_LOG_MARKS] += 1
 
     def flush(self) -> None:
-        """Give what was added to the operating system."""
+        """Pass all items to the operating system."""
         self._file.flush()
 
     def close(self) -> None:
@@ -65,7 +65,7 @@ class TraceLogWriter:
                 self._file.close()
 
     def messages(self) -> list[str]:
-        """Report what was left out."""
+        """Report the items that were left out."""
         return [
             f"{self._name}: a trace holds one bus, without errors; left out: {count} {what}"
             for what, count in self._left_out.items()
@@ -86,15 +86,16 @@ class TraceLogWriter:
 
 
 def _name(channel: str) -> str:
-    """Return a bus by a name that can stand in a trace."""
+    """Return the name of a bus in a form that a trace can hold."""
     return re.sub(r"[^\w./:-]|^\W", "_", channel, flags=re.ASCII)
 
 
 class TraceLogReader:
     """A reader of the frames in a trace.
 
-    From a trace that was recorded at the devices, it returns the frames in the order in which they
-    were sent or first received. A frame of the host that several nodes received is returned once.
+    For a trace that was recorded at the devices, the reader returns the frames in the order in
+    which they were sent or first received. A frame of the host that several nodes received is
+    returned once.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -120,19 +121,19 @@ class TraceLogReader:
             raise log_file.LogError(f"{self._path}: it is not ASCII") from None
 
     def items(self) -> Iterator[Record]:
-        """Read the file; it holds no marks."""
+        """Read the file, which holds no marks."""
         return iter(self)
 
 
 def _whole_lines(file: BinaryIO) -> Iterator[str]:
-    """Return the lines; a last one without LF comes from a writer that was killed."""
+    """Return the lines. A last line without LF is from a writer that was killed."""
     for line in file:
         if line.endswith(b"\n"):
             yield line[:-1].decode("ascii")
 
 
 class _Passed:
-    """Reconstructs the traffic of a bus from what its nodes sent and received."""
+    """The traffic of a bus, reconstructed from the frames that its nodes sent and received."""
 
     def __init__(self, header: bench_header.BenchHeader) -> None:
         self._header = header
@@ -141,7 +142,7 @@ class _Passed:
         self._awaited: defaultdict[str, Counter[CanFrame]] = defaultdict(Counter)
 
     def take(self, record: BenchRecord, frame: CanFrame) -> Iterator[Record]:
-        """Give a frame, unless it was given before."""
+        """Yield a frame, unless it was already yielded."""
         header, name = self._header, record.name
         wire = header.devices[name].wire
         if header.place is bench_header.Place.PORT:

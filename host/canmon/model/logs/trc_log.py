@@ -1,4 +1,4 @@
-"""PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
+"""Reader of PEAK's traces (TRC) of versions 1.0 to 3.0, with their error frames.
 
 >>> lines, tally = _TrcLines(), log_file.LogTally()
 >>> lines.read(";$FILEVERSION=1.1", tally)
@@ -28,13 +28,14 @@ _VERSIONS: Final = {
     "1.3": ("N", "O", "B", "T", "I", "R", "L", "D"),
 }
 """Columns by version: number, offset in ms, bus, type, CAN-ID, reserved, length, data, direction.
-From 2.0 on the file names them: `l` is a count of bytes, `L` a length code."""
+From version 2.0 on, the file names the columns. `l` is a count of bytes, `L` a length code.
+"""
 
 _FD_FLAGS: Final = {"FD": 0, "FB": can.BRS, "BI": can.ESI, "FE": can.BRS | can.ESI}
 """Types of CAN FD frames."""
 
 ERROR: Final = "ERROR"
-"""In version 1.0 it stands before the data of an error frame."""
+"""Word before the data of an error frame in version 1.0."""
 _ERRORS: Final = ("Error", "ER")
 _STATES: Final = ("Warng", "ST")
 _COUNTERS: Final = "EC"
@@ -43,7 +44,7 @@ _EVENT: Final = "EV"
 _DAYS_TO_1970: Final = 25_569
 _DAY_US: Final = 86_400_000_000
 _LATEST_DAYS: Final = 2_958_465
-"""The end of 9999."""
+"""Number of days until the end of 9999."""
 
 _HEAD: Final = re.compile(r";\$(FILEVERSION|STARTTIME|COLUMNS)=\s*(\S+)", re.IGNORECASE)
 _OFFSET: Final = re.compile(r"(-?)([0-9]{1,16})(?:\.([0-9]{1,9}))?", re.ASCII)
@@ -53,7 +54,7 @@ _BYTE: Final = re.compile(r"[0-9A-Fa-f]{2}")
 _LENGTH: Final = re.compile(r"[0-9]{1,2}", re.ASCII)
 
 _STANDARD_DIGITS: Final = 4
-"""A CAN-ID of more digits has 29 bits."""
+"""Number of digits above which a CAN-ID has 29 bits."""
 
 _STATUS: Final = {
     0x10: "that a controller is bus-off",
@@ -61,35 +62,35 @@ _STATUS: Final = {
     0x08: "that a controller has reached its warning limit (BUSHEAVY)",
     0x04: "that a controller has reached its warning limit (BUSLIGHT)",
 }
-"""Bits of a status (PCAN-Basic, PCAN_ERROR_...), the worst first."""
+"""Bits of a status (PCAN-Basic, PCAN_ERROR_...). The worst bit is first."""
 
 _KINDS: Final = {1: can.ProtocolFlag.BIT, 2: can.ProtocolFlag.FORM, 4: can.ProtocolFlag.STUFFING}
 _ACK_SLOT: Final = 0x19
 _SEGMENT: Final = 0x1F
-"""Place of an error in the frame, as the SJA1000 tells it, and Linux in byte 3."""
+"""Mask of the place of an error in the frame, as in the SJA1000, and in byte 3 of Linux."""
 
 
 class _Row(NamedTuple):
-    """The columns of a line, by their letters."""
+    """The columns of a line by letter."""
 
     cells: dict[str, str]
     data: list[str]
 
     def hex_bytes(self) -> bytes:
-        """Return the data up to the first word that is no byte, as `--` and `BUSHEAVY`."""
+        """Return the data up to the first word that is not a byte, such as `--` or `BUSHEAVY`."""
         count = next((n for n, word in enumerate(self.data) if not _BYTE.fullmatch(word)), None)
         return bytes.fromhex("".join(self.data[:count]))
 
 
 class _TrcLines:
-    """Reads the lines of a trace, in their order."""
+    """Reader of the lines of a trace, in their order."""
 
     def __init__(self) -> None:
         self._version, self._start_us = "1.0", 0
         self._columns: Sequence[str] = _VERSIONS["1.0"]
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame; another item that the line contains; or None for an invalid line.
+        """Return a frame, another item of the line, or None for an invalid line.
 
         Raises:
             ValueError: the columns are unknown.
@@ -113,7 +114,7 @@ class _TrcLines:
             return None
 
     def _head(self, word: str, value: str, tally: log_file.LogTally) -> None:
-        """Take what the file says of itself."""
+        """Read a header line, which describes the file."""
         match word:
             case "FILEVERSION":
                 self._version, self._columns = value, _VERSIONS.get(value, ())
@@ -147,7 +148,7 @@ class _TrcLines:
         return self._start_us + int(f"{sign}1") * ((nanos + 500) // 1_000)
 
     def _cells(self, words: list[str]) -> _Row:
-        """Tell the columns apart: lines without a CAN-ID leave some out, those of 2.0 its own."""
+        """Separate the columns. Lines without a CAN-ID omit some, and version 2.0 omits others."""
         names = list(self._columns)
         place = names.index("T") if "T" in names else len(words)
         kind = words[place] if place < len(words) else ""
@@ -170,7 +171,7 @@ class _TrcLines:
 
 
 def _aside(row: _Row, kind: str, tally: log_file.LogTally) -> str:
-    """Return the kind of a line that is not a CAN or CAN FD frame, and record errors in it."""
+    """Return the kind of a line that is not a CAN or CAN FD frame. Record errors in the line."""
     if kind == "XL":
         return log_file.CAN_XL
     # Version 1.0 has no type; a status has the CAN-ID FFFFFFFFh there.
@@ -185,7 +186,7 @@ def _aside(row: _Row, kind: str, tally: log_file.LogTally) -> str:
 
 
 def _start_us(days: str) -> int | None:
-    """Return the start of a trace; None if it is not a date since 1970."""
+    """Return the start of a trace, or None if it is not a date since 1970."""
     try:
         value = float(days)
     except ValueError:
@@ -216,7 +217,7 @@ def _frame(row: _Row, kind: str) -> AnyFrame:
 
 
 def _length(cells: dict[str, str], *, fd: bool) -> int:
-    """Return how many bytes a frame has; of a classic length code above 8 it has 8."""
+    """Return the number of bytes of a frame. A classic length code above 8 means 8 bytes."""
     text = cells["l"] if "l" in cells else cells["L"]
     if not _LENGTH.fullmatch(text):
         raise ValueError(f"{text!r} is no length")
@@ -228,8 +229,8 @@ def _length(cells: dict[str, str], *, fd: bool) -> int:
 def _error(row: _Row) -> can.ErrorFrame:
     """Return an error frame in the notation of Linux.
 
-    Up to version 1.3 the CAN-ID is the type of the error, and the data are direction, place and
-    both counters. From version 2.0 on the data begin with the type.
+    Up to version 1.3, the CAN-ID is the type of the error, and the data are direction, place and
+    both counters. From version 2.0 on, the data begin with the type.
     """
     data = [*_Row({}, [word for word in row.data if word != ERROR]).hex_bytes()]
     if "I" in row.cells:
@@ -247,7 +248,7 @@ def _error(row: _Row) -> can.ErrorFrame:
 
 
 def _note_status(status: bytes, tally: log_file.LogTally) -> None:
-    """Note what a status says of errors; 0 says that all is well."""
+    """Record the errors in a status. 0 means that there is no error."""
     bits = int.from_bytes(status, "big")
     text = next((text for bit, text in _STATUS.items() if bits & bit), None)
     if text is not None:

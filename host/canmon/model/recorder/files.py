@@ -1,4 +1,4 @@
-"""The files of a recording: numbered, of limited size, the oldest removed, in an index.
+"""The files of a recording, which are numbered, limited in size, rotated, and listed in an index.
 
 >>> plan = read_plan(Path("run.log.gz"), rotate=["100M", "10min"], disk="1G")
 >>> plan.rotate_bytes, plan.rotate_us, plan.disk_bytes, plan.at_limit.value
@@ -38,17 +38,20 @@ if TYPE_CHECKING:
 
 
 _MIN_BYTES: Final = 64 << 10
-"""Of a file: smaller ones are no use."""
+"""Smallest useful size of a file."""
 
 _MIN_DISK_BYTES: Final = 1 << 20
 _RESERVE_BYTES: Final = 256 << 10
-"""Room that is kept free: for frames that are on their way to a file."""
+"""Disk space that is kept free for frames that are on their way to a file."""
 
 MAX_PRE_FRAMES: Final = 150_000
-"""Eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB."""
+"""Maximum number of frames before a trigger.
+
+They are eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB.
+"""
 
 _DISK_PARTS: Final = 4
-"""Where disk space is limited a file is no larger than this part of it: the oldest can go."""
+"""Number of parts of limited disk space that a file may not exceed, so that the oldest can go."""
 
 _SIZE: Final = re.compile(r"([0-9]{1,9})([kMG])")
 _SHIFT: Final = {"k": 10, "M": 20, "G": 30}
@@ -57,14 +60,17 @@ _UNIT_US: Final = {"ms": 1_000, "s": 1_000_000, "min": 60_000_000, "h": 3_600_00
 
 
 class AtLimit(StrEnum):
-    """What happens where the disk space of a recording is used up."""
+    """Action when the disk space of a recording is used up."""
 
     OLDEST = "oldest"  # goes
     END = "end"
 
 
 class TriggerSpan(NamedTuple):
-    """The length before or after a trigger: a number of frames, or a time; the other is None."""
+    """The length before or after a trigger, either a number of frames or a time.
+
+    The other is None.
+    """
 
     frames: int | None
     us: int | None
@@ -75,16 +81,16 @@ DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingPlan:
-    """The settings of a recording; without any it is the single file `path`.
+    """The settings of a recording. Without any setting, it is the single file `path`.
 
     Attributes:
-        path: the file, or the base name of its parts.
-        rotate_bytes: a part ends before it exceeds this size; None for no limit.
-        rotate_us: a part ends at the first frame that is at least this much later than its first
-            one.
+        path: path of the file, or base name of its parts.
+        rotate_bytes: size that a part may not exceed, or None for no limit.
+        rotate_us: duration of a part. The part ends at the first frame that is at least this much
+            later than its first frame.
         disk_bytes: limit of the total size of all parts.
-        at_limit: what happens at that limit.
-        around: spans of traffic to record before and after a trigger; None to record everything.
+        at_limit: action at the limit of disk space.
+        around: spans of traffic to record before and after a trigger, or None to record everything.
         parts: whether to record in parts, even if no setting requires it.
     """
 
@@ -98,21 +104,21 @@ class RecordingPlan:
 
     @property
     def numbered(self) -> bool:
-        """Whether it has parts and an index."""
+        """Whether the recording has parts and an index."""
         limits = (self.rotate_bytes, self.rotate_us, self.disk_bytes)
         return self.parts or self.around is not None or any(one is not None for one in limits)
 
     @property
     def index(self) -> Path:
-        """Its index."""
+        """Path of the index."""
         return self.path.with_name(f"{self._stem}.index.jsonl")
 
     def part(self, number: int) -> Path:
-        """Return its part of a number, from 1."""
+        """Return the path of a part by its number, from 1."""
         return self.path.with_name(f"{self._stem}-{number:05d}{self._ending}")
 
     def number(self, name: str) -> int:
-        """Return the number of a part; 0 if it is none."""
+        """Return the number of a part, or 0 if the path is not a part."""
         pattern = rf"{re.escape(self._stem)}-([0-9]{{5,9}}){re.escape(self._ending)}"
         match = re.fullmatch(pattern, name)
         return int(match[1]) if match else 0
@@ -140,17 +146,17 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     """Parse the arguments of a recording.
 
     Args:
-        path: the file; parts are named after it.
-        rotate: at most one size and one time.
+        path: path of the file. Parts are named after it.
+        rotate: limits of a part, at most one size and one time.
         disk: limit of the total size of all parts.
-        at_limit: `oldest` or `end`.
+        at_limit: action at the limit, `oldest` or `end`.
         pre: span to record before a trigger.
-        post: span to record after it.
+        post: span to record after a trigger.
         waits: whether the recording waits for a trigger, even without `pre` and `post`.
         parts: whether to record in parts, even if nothing else requires it.
 
     Raises:
-        ValueError: an argument that is invalid, too small, or needs another one.
+        ValueError: an argument is invalid, too small, or needs another argument.
     """
     sizes = [_parse_bytes("rotate", word) for word in rotate if _SIZE.fullmatch(word)]
     times = [_rotate_us(word) for word in rotate if not _SIZE.fullmatch(word)]
@@ -186,7 +192,7 @@ def _parse_bytes(name: str, word: str, least: int = _MIN_BYTES) -> int:
     """Read a size with its unit.
 
     Raises:
-        ValueError: it is none, or below `least`.
+        ValueError: the text is not a size, or is below `least`.
     """
     match = _SIZE.fullmatch(word)
     if match is None:
@@ -201,7 +207,7 @@ def _parse_bytes(name: str, word: str, least: int = _MIN_BYTES) -> int:
 
 
 def _parse_span(name: str, word: str | None) -> TriggerSpan:
-    """Parse a number of frames, or a time; without a word, return 5 s.
+    """Parse a number of frames, or a time. Without a word, return 5 s.
 
     Raises:
         ValueError: the word is neither, or is too many frames before a trigger.
@@ -239,32 +245,32 @@ def _time_us(word: str) -> int | None:
 # One file of a recording.
 
 _BLOCK_US: Final = 1_000_000
-"""How much of a compressed log is lost where this program is killed."""
+"""Part of a compressed log that is lost if this program is killed."""
 
 _READ_BYTES: Final = 32 << 20
-"""Of a file that is read when a recording goes on: a few seconds."""
+"""Number of bytes that are read of a file when a recording continues. This takes a few seconds."""
 
 _USUAL_BYTES: Final = 64
-"""Of a frame, until there are some."""
+"""Assumed number of bytes of a frame, until there are some frames."""
 
 
 class _RecordingPart:
-    """A log that is being written, and its content.
+    """A log that is being written, and the summary of its content.
 
     Args:
-        path: the file; one that exists is replaced.
+        path: path of the file. An existing file is replaced.
 
     Attributes:
         frames: number of written frames.
         safe_frames: number of frames that were passed to the operating system, and are readable.
         bytes: size of the written part of the file.
-        first_us: time of the first frame; None before it.
+        first_us: time of the first frame, or None before it.
         last_us: time of the last frame.
 
     Raises:
-        OSError: it cannot be written, now or later.
-        LogFormatError: its name has no known format.
-        LogError: its format cannot be written on this machine.
+        OSError: the file cannot be written, now or later.
+        LogFormatError: the name of the file has no known format.
+        LogError: the format cannot be written on this machine.
     """
 
     def __init__(self, path: Path) -> None:
@@ -278,7 +284,7 @@ class _RecordingPart:
         self._marks, self._lost, self._pending = Counter[str](), 0, False
 
     def room(self, limit: int | None) -> int:
-        """Return how many frames there is room for below a size, at least about."""
+        """Return the approximate number of frames that fit below a size."""
         if limit is None:
             return 1 << 30
         each = max(1, self.bytes // self.frames) if self.frames else _USUAL_BYTES
@@ -294,7 +300,7 @@ class _RecordingPart:
         self.last_us, self._pending = records[-1].at_us, True
 
     def write_block(self, block: TextBlock) -> bool:
-        """Add many frames at once; False where its format wants them one by one."""
+        """Add many frames at once. Return False if the format needs them one by one."""
         if self._write_block is None or not self._write_block(block):
             return False
         self.frames += len(block)
@@ -310,7 +316,7 @@ class _RecordingPart:
         self._pending = True
 
     def flush(self, now_us: int) -> None:
-        """Give to the operating system what was written; what is compressed, once a second."""
+        """Pass the written data to the operating system, once a second for a compressed log."""
         if not self._pending:
             return
         if self._in_blocks:
@@ -323,13 +329,13 @@ class _RecordingPart:
         self.bytes = self._safe_bytes = self.path.stat().st_size
 
     def close(self) -> list[str]:
-        """End the log; return what it could not hold."""
+        """End the log. Return messages about items that the format could not hold."""
         self._writer.close()
         self.bytes, self.safe_frames = self.path.stat().st_size, self.frames
         return self._writer.messages()
 
     def rescue(self) -> None:
-        """End it after an error: what is whole stays, and half a frame behind it goes."""
+        """End the log after an error. Whole items stay, and half a frame after them is removed."""
         with suppress(OSError, ValueError):
             self._writer.close()
         with suppress(OSError):
@@ -338,7 +344,7 @@ class _RecordingPart:
         self.bytes = self._safe_bytes
 
     def summary(self) -> dict[str, object]:
-        """Return what an index says of it."""
+        """Return the entry of the file in the index."""
         said: dict[str, object] = {"from": None, "to": None}
         if self.first_us is not None and self.last_us is not None:
             said = {"from": self.first_us / 1e6, "to": self.last_us / 1e6}
@@ -358,7 +364,7 @@ def _recovered(path: Path) -> dict[str, object]:
     A large file is not read, because new frames would have to wait.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     size, frames, first_us, last_us = path.stat().st_size, 0, 0, 0
     if size > _READ_BYTES:
@@ -379,19 +385,20 @@ _END: Final = "end"
 
 
 class _Index:
-    """A file that gets each line appended at once; an existing file is continued.
+    """The index file. Each line is appended at once, and an existing file is continued.
 
     Args:
-        path: of the file.
-        is_part: returns whether a name is that of a part; lines about other files are ignored.
+        path: path of the file.
+        is_part: function that returns whether a name is that of a part. Lines about other files are
+            ignored.
 
     Attributes:
-        files: size of each completed file that still exists, the oldest first.
+        files: size of each completed file that still exists. The oldest file is first.
         bytes: total size of these files.
         unended: files that were started, and neither completed nor removed.
 
     Raises:
-        OSError: it cannot be written, now or later.
+        OSError: the file cannot be written, now or later.
     """
 
     def __init__(self, path: Path, is_part: Callable[[str], object]) -> None:
@@ -414,7 +421,7 @@ class _Index:
         self._put(json.dumps(said, separators=(",", ":")))
 
     def mark(self, mark: log_file.Mark, file: str) -> None:
-        """Add a mark, and in which file it stands; an empty name for none."""
+        """Add a mark and the name of the file that contains it, which is empty for no file."""
         text = mark.json()
         self._put(f'{text[:-1]},"file":{json.dumps(file)}}}' if file else text)
 
@@ -457,26 +464,26 @@ def _objects(text: str) -> Iterator[dict[str, Any]]:
 # The files of a recording: numbered, of limited size, the oldest removed, in an index.
 
 _BLOCK_FRAMES: Final = 1_024
-"""Frames that are written between two looks at sizes."""
+"""Number of frames that are written between two checks of the file size."""
 
 _LOOK_FRAMES: Final = 512
-"""Frames that come between two looks at the space on the disk."""
+"""Number of frames that arrive between two checks of the disk space."""
 
 
 class Files:
-    """Writes frames and marks into one file, or into parts that the index lists.
+    """Writer of frames and marks into one file, or into parts that the index lists.
 
-    A recording with an existing index is continued: its parts stay, and count for the limits.
+    A recording with an existing index is continued. Its parts stay, and count for the limits.
 
     Args:
-        plan: its settings.
-        now_us: the time.
+        plan: settings of the recording.
+        now_us: current time.
 
     Attributes:
         frames: number of frames to be written.
         parts: number of started files.
         removed: number of removed files.
-        ended: why no more is written; empty if writing continues.
+        ended: reason why writing ended, empty if writing continues.
 
     Raises:
         OSError: a file cannot be written, now or later.
@@ -500,16 +507,16 @@ class Files:
 
     @property
     def safe_frames(self) -> int:
-        """How many frames the operating system has, or the parts that were removed had."""
+        """Number of frames that the operating system has, including frames of removed parts."""
         return self._safe_frames + (0 if self._part is None else self._part.safe_frames)
 
     @property
     def path(self) -> Path:
-        """The file that is written, or would be next."""
+        """The file that is being written, or the next file."""
         return self._plan.path if self._part is None else self._part.path
 
     def store(self, records: Sequence[Record]) -> None:
-        """Add frames, in the order in which they came."""
+        """Add frames in the order of arrival."""
         self.frames += len(records)
         begin = 0
         while begin < len(records) and not self.ended:
@@ -525,7 +532,7 @@ class Files:
             self._keep_limit()
 
     def store_block(self, block: TextBlock) -> bool:
-        """Add many frames at once; False where they are to be stored one by one."""
+        """Add many frames at once. Return False if they must be stored one by one."""
         part = self._part
         if self._index is not None or part is None or not part.write_block(block):
             return False
@@ -535,24 +542,24 @@ class Files:
         return True
 
     def mark(self, mark: log_file.Mark) -> None:
-        """Add a mark to the file that is under way, and to the index."""
+        """Add a mark to the current file and to the index."""
         if self._part is not None:
             self._part.mark(mark)
         if self._index is not None:
             self._index.mark(mark, "" if self._part is None else self._part.path.name)
 
     def mark_again(self, mark: log_file.Mark) -> None:
-        """Add a mark to the file that is under way; the index has it."""
+        """Add a mark to the current file only, because the index already has the mark."""
         if self._part is not None:
             self._part.mark(mark)
 
     def flush(self, now_us: int) -> None:
-        """Give to the operating system what was written."""
+        """Pass the written data to the operating system."""
         if self._part is not None:
             self._part.flush(now_us)
 
     def end_part(self) -> None:
-        """End the file that is under way; the next frame begins another."""
+        """End the current file. The next frame begins another file."""
         part = self._part
         if part is None:
             return
@@ -563,7 +570,7 @@ class Files:
             self._index.write(_FILE, self._latest_us, file=part.path.name, **part.summary())
 
     def rescue(self, why: str) -> None:
-        """End the recording after an error, so that what is in files can be read."""
+        """End the recording after an error, so that the content of files can be read."""
         part, self._part = self._part, None
         if part is not None:
             part.rescue()
@@ -584,7 +591,7 @@ class Files:
             self._index.close()
 
     def messages(self) -> list[str]:
-        """Report what formats could not hold, and remains of an earlier recording."""
+        """Report items that formats could not hold, and remains of an earlier recording."""
         return self._said
 
     def _part_for(self, record: Record) -> _RecordingPart:
@@ -608,7 +615,7 @@ class Files:
     def _up_to_due(
         self, part: _RecordingPart, records: Sequence[Record], begin: int, end: int
     ) -> int:
-        """Return where the first of these frames is that belongs into the next file."""
+        """Return the position of the first of these frames that belongs to the next file."""
         after_us = self._plan.rotate_us
         if after_us is None:
             return end
@@ -635,7 +642,7 @@ class Files:
         return [self._plan.number(name) for name in (*here, *self._index.files)] or [0]
 
     def _recover(self, index: _Index, now_us: int) -> None:
-        """Put files into the index that a recorder was killed at."""
+        """Add files to the index that a killed recorder did not complete."""
         for name in list(index.unended):
             path = self._plan.path.with_name(name)
             if path.is_file():
@@ -646,7 +653,7 @@ class Files:
                 index.write(_REMOVED, now_us, file=name)
 
     def _keep_limit(self) -> None:
-        """Remove the oldest files, or end, where disk space is used up."""
+        """Remove the oldest files, or end the recording, if disk space is used up."""
         index, disk_bytes = self._index, self._plan.disk_bytes
         if index is None:
             return
@@ -674,7 +681,7 @@ class Files:
                 raise OSError(errno.ENOSPC, left, path)
 
     def _remove_oldest(self, index: _Index) -> bool:
-        """Remove a file; return whether it existed."""
+        """Remove a file. Return whether the file existed."""
         if not index.files:
             return False
         name = next(iter(index.files))
@@ -685,7 +692,7 @@ class Files:
 
 
 def _readable(found: dict[str, object]) -> str:
-    """Return what can be read of a file that was not completed."""
+    """Return the readable content of a file that was not completed."""
     if found["frames"] is None:
         return f"it has {found['bytes']} bytes; what came behind them is missing"
     last = "" if found["to"] is None else f", the last of {found['to']} s"

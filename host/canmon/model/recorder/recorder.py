@@ -1,4 +1,4 @@
-"""A recorder: takes frames as they come, and keeps all of them, or those around triggers."""
+"""A recorder that keeps all arriving frames, or the frames around triggers."""
 
 from __future__ import annotations
 
@@ -32,32 +32,32 @@ if TYPE_CHECKING:
 
 
 class Trigger(Protocol):
-    """Looks at each frame.
+    """A trigger that examines each frame.
 
     Attributes:
-        name: what people call it.
-        decodes: it asks what frames mean.
+        name: displayed name of the trigger.
+        decodes: whether the trigger needs decoded frames.
     """
 
     name: str
     decodes: bool
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
-        """Return why this frame is a trigger; empty if it is not."""
+        """Return why a frame is a trigger, or an empty text if it is not."""
 
     def missing(self, now_us: int, lost: int, /) -> str:
         """Return why a missing or lost frame is a trigger."""
 
     def messages(self) -> list[str]:
-        """Return other notes about it."""
+        """Return other notes about the trigger."""
 
 
 class FilterTrigger:
-    """Frames that pass a filter.
+    """Trigger by frames that pass a filter.
 
     Args:
-        name: the filter as it is written.
-        wanted: the filter.
+        name: text of the filter.
+        wanted: filter that frames must pass.
     """
 
     def __init__(self, name: str, wanted: Filter) -> None:
@@ -65,27 +65,27 @@ class FilterTrigger:
         self._missing = MissingSignals(wanted.signals, wanted.words)
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
-        """Return the filter if the frame passes."""
+        """Return the filter text if the frame passes."""
         assert decoded is not None, "who filters has decoded"
         if self._missing:
             self._missing.take(record, decoded)
         return self.name if self._wanted.matches(record, decoded) else ""
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Nothing: a filter is about what came."""
+        """Return nothing, because a filter applies only to frames that arrived."""
         return ""
 
     def messages(self) -> list[str]:
-        """Return the signals in it that never came."""
+        """Return the signals of the filter that never occurred."""
         return self._missing.messages()
 
 
 class RuleTrigger:
-    """Findings of the rules of a check.
+    """Trigger by findings of the rules of a check.
 
     Args:
-        name: of the rules, as of their file.
-        alarms: the rules.
+        name: name of the rules, such as the name of their file.
+        alarms: rules with their alarms.
     """
 
     def __init__(self, name: str, alarms: Alarms) -> None:
@@ -93,21 +93,21 @@ class RuleTrigger:
         self.decodes = bool(alarms.rules.expressions)
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
-        """Return what is wrong with the frame."""
+        """Return the violation in the frame."""
         self._alarms.take(record, decoded)
         return self._found()
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Return what is missing."""
+        """Return the violation by a missing frame."""
         self._alarms.check_missing(now_us, lost)
         return self._found()
 
     def messages(self) -> list[str]:
-        """Nothing."""
+        """Return no messages."""
         return []
 
     def _found(self) -> str:
-        """Return the first of the new findings; the others are of the same moment."""
+        """Return the first of the new findings. The other findings are of the same moment."""
         findings = self._alarms.findings
         if not findings:
             return ""
@@ -149,14 +149,14 @@ _Entry = Record | Mark
 
 
 _MAX_MARKS: Final = 1_000
-"""That are kept among frames; the index has all of them."""
+"""Number of marks that are kept among frames. The index has all marks."""
 
 
 class PreTrigger:
-    """Keeps the latest frames, and the marks among them.
+    """Buffer of the latest frames, and of the marks among them.
 
     Args:
-        span: number of frames before the latest one, or a time.
+        span: number of frames before the latest frame, or a time.
 
     Attributes:
         short: whether frames of the span were dropped, because there were too many.
@@ -168,7 +168,7 @@ class PreTrigger:
         self._frames, self.short = 0, False
 
     def add(self, record: Record) -> None:
-        """Keep one more frame; give up what is too old."""
+        """Keep one more frame. Drop frames that are too old."""
         self._entries.append(record)
         self._frames += 1
         if self._us is not None:
@@ -187,7 +187,7 @@ class PreTrigger:
             self._entries.append(mark)
 
     def drain(self) -> list[_Entry]:
-        """Return all that is kept, the oldest first, and keep nothing."""
+        """Return all kept items in order of time, and clear the buffer."""
         found = list(self._entries)
         self._entries.clear()
         self._frames = 0
@@ -198,17 +198,17 @@ class PreTrigger:
 
 
 _LATE_US: Final = 1_000_000
-"""A frame is taken to have come by then, when time alone says that a recording is over."""
+"""Time until which a frame has arrived, if only time shows that a recording is over."""
 
 _MOST_CHARACTERS: Final = 200
 """Length limit of the text about a frame that was a trigger."""
 
 _LOOK_US: Final = 100_000
-"""How often rules are asked what is missing."""
+"""Interval at which rules are asked for missing frames."""
 
 
 class RecorderState(StrEnum):
-    """How a recorder stands."""
+    """State of a recorder."""
 
     WAITING = "waiting"
     RECORDING = "recording"
@@ -217,7 +217,7 @@ class RecorderState(StrEnum):
 
 
 class _Window:
-    """What is recorded behind a trigger; another trigger makes it longer."""
+    """The span that is recorded after a trigger. Another trigger extends the span."""
 
     def __init__(self, span: TriggerSpan, at_us: int) -> None:
         self._span = span
@@ -239,27 +239,27 @@ class _Window:
 
 
 class Recorder:
-    """Records the frames that it gets.
+    """Recorder of frames that it receives.
 
-    Times are those of the source: frames contain them, and `now_us` continues from the latest
+    Times are those of the source. Frames contain them, and `now_us` continues from the latest
     frame. If a file cannot be written, the recording ends. Later frames are counted as missing.
 
     Args:
         plan: settings of the recording.
-        now_us: the time.
-        triggers: what it waits for, if the plan has a trigger.
-        wanted: which frames are recorded; None for all. Triggers see all of them.
+        now_us: current time.
+        triggers: triggers that start the recording, if the plan has a trigger.
+        wanted: filter for the frames that are recorded, or None for all. Triggers see all frames.
         lost: number of frames that the source lost before.
 
     Attributes:
         plan: settings of the recording.
-        failed: why the recording ended early; empty if it did not.
+        failed: reason why the recording ended early, empty if it did not.
         triggers: number of triggers that occurred.
 
     Raises:
         OSError: the file cannot be written.
         LogFormatError: the name of the file has no known format.
-        LogError: its format cannot be written on this machine.
+        LogError: the format cannot be written on this machine.
     """
 
     def __init__(
@@ -280,7 +280,7 @@ class Recorder:
 
     @property
     def state(self) -> RecorderState:
-        """How it stands."""
+        """The state of the recorder."""
         if self.failed:
             return RecorderState.FAILED
         if self._files.ended or self._closed:
@@ -290,17 +290,17 @@ class Recorder:
 
     @property
     def ended(self) -> str:
-        """Why it records no more; empty while it does."""
+        """Reason why the recording has ended, empty while it continues."""
         return self.failed or self._files.ended
 
     @property
     def frames(self) -> int:
-        """How many frames are in files, those that were removed among them."""
+        """The number of frames in files, including removed files."""
         return self._files.safe_frames
 
     @property
     def missing(self) -> int:
-        """How many frames should be in files, and are not."""
+        """The number of frames that should be in files, but are not."""
         return self._files.frames - self._files.safe_frames + self._missing if self.failed else 0
 
     def take(
@@ -313,9 +313,9 @@ class Recorder:
         """Process frames and marks that have arrived.
 
         Args:
-            decoded_frames: frames, each with its meaning if a filter needs that.
+            decoded_frames: frames, each with its meaning if a filter needs decoded frames.
             lost: total number of lost frames.
-            now_us: the time.
+            now_us: current time.
             marks: events after these frames.
         """
         if self.state in (RecorderState.FAILED, RecorderState.ENDED):
@@ -333,11 +333,11 @@ class Recorder:
             self._fail(error)
 
     def take_block(self, block: TextBlock, now_us: int) -> bool:
-        """Process many frames; return False if they must be processed one by one.
+        """Process many frames. Return False if they must be processed one by one.
 
         Args:
-            block: at least one frame, with no event after the frames.
-            now_us: the time.
+            block: block of at least one frame, with no event after the frames.
+            now_us: current time.
         """
         whole = self._before is None and self._wanted is None
         if not whole or self.state is not RecorderState.RECORDING:
@@ -352,7 +352,7 @@ class Recorder:
         return stored
 
     def trigger(self, why: str, now_us: int) -> None:
-        """Record the kept frames and the following ones: the user pressed a key."""
+        """Record the kept frames and the following frames, because the user pressed a key."""
         if self._before is not None and self.state in (
             RecorderState.WAITING,
             RecorderState.RECORDING,
@@ -375,7 +375,7 @@ class Recorder:
             self._fail(error)
 
     def messages(self) -> list[str]:
-        """Report the result, one line each."""
+        """Report the result, with one line per message."""
         said = self._files.messages()
         if self._before is not None and self._before.short:
             said = [*said, "too many frames came before a trigger: the oldest of them had to go"]
@@ -396,7 +396,7 @@ class Recorder:
         return f"{said}; {self.plan.index}" if self.plan.numbered else said
 
     def _watch(self, decoded_frames: Sequence[tuple[AnyRecord, Decoded | None]]) -> None:
-        """Look at each frame; keep or record it."""
+        """Examine each frame. Keep or record it."""
         pending: list[Record] = []
         for one, decoded in decoded_frames:
             record = cast("Record", one)
@@ -432,7 +432,7 @@ class Recorder:
             self._files.mark(triggered(at_us, f"{why}{what}"))
 
     def _store(self, entries: Sequence[_Entry]) -> None:
-        """Add frames with the marks among them; these are in the index already."""
+        """Add frames with the marks among them. The index has these marks already."""
         for is_mark, group in groupby(entries, lambda entry: isinstance(entry, Mark)):
             if is_mark:
                 for mark in group:
@@ -473,6 +473,6 @@ class Recorder:
 
 
 def _what(record: Record, decoded: Decoded | None) -> str:
-    """Return the frame with its meaning, as text."""
+    """Return the frame with its meaning as text."""
     text = decoded_text(decoded)
     return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:_MOST_CHARACTERS]
