@@ -1,4 +1,4 @@
-"""What a command may do in the world, in a sentence: empty where it moves nothing."""
+"""The physical effects that a command may have, as a sentence. It is empty if nothing moves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tickrig.host.canmon.model.decode.node_memory import Entry
 from tickrig.wire.canopen.nmt import NmtCommand
 
 _DRIVE_AREA: Final = range(0x6000, 0xA000)
-"""Objects of the device profiles; those of CiA 402 for eight axes, each 800h further."""
+"""Objects of the device profiles. CiA 402 has objects for eight axes at a distance of 800h."""
 _AXIS: Final = 0x800
 _COMMANDS: Final = {
     0x40: "controlword",
@@ -22,7 +22,7 @@ _COMMANDS: Final = {
     0xC1: "interpolated position",
     0xFF: "target velocity",
 }
-"""What turns a motor, by the low part of the index (CiA 402-2)."""
+"""Objects that may turn a motor, by the low part of the index (CiA 402-2)."""
 _MANUFACTURER: Final = range(0x2000, 0x6000)
 _DRIVE_PROFILE: Final = 402
 _IO_PROFILE: Final = 401
@@ -35,11 +35,11 @@ NMT_WORDS: Final = {
     "reset-node": NmtCommand.RESET_NODE,
     "reset-comm": NmtCommand.RESET_COMMUNICATION,
 }
-"""NMT commands as `canmon net nmt` and the screen call them."""
+"""NMT commands with the names that `canmon net nmt` and the screen use."""
 
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
-    """Return what writing objects may move at a node, a CiA 402 drive or another one."""
+    """Return the motion that a write to a node may cause, for a CiA 402 drive or another device."""
     indices = [index for index, _ in entries]
     profile = [index for index in indices if index in _DRIVE_AREA]
     told = [name for index in profile if (name := _COMMANDS.get((index - 0x6000) % _AXIS))]
@@ -54,11 +54,11 @@ def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
 
 
 def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
-    """Return what an NMT command may move at one node.
+    """Return the motion that an NMT command may cause at one node.
 
     Args:
-        command: the command.
-        device_type: 1000h of the node, None if unknown.
+        command: NMT command.
+        device_type: device type (object 1000h) of the node, or None if unknown.
     """
     profile = _SEVERAL if device_type is None else device_type & 0xFFFF
     may_turn = profile in (_DRIVE_PROFILE, _SEVERAL)

@@ -1,10 +1,10 @@
-"""The workspace: one TOML file for the settings of all panels.
+"""The workspace, which is one TOML file for the settings of all panels.
 
-It is read and written as a whole. Writing uses a temporary file, so that a partial file never
+The file is read and written as a whole. Writing uses a temporary file, so that a partial file never
 exists. Unknown settings and comments are kept. A file that another program has changed is not
 overwritten.
 
-Settings of a panel in a workspace, checked one by one.
+The settings of a panel in a workspace are checked one by one.
 
 >>> truth({"bits": True}, "bits", False), choice({}, "time", "z", ["z", "d"])
 (True, 'z')
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 
 
 _MOST: Final = 200_000
-"""Characters; tomlkit takes the square of it."""
+"""Maximum number of characters. The time of tomlkit grows with the square of this number."""
 
 
 class SettingError(ValueError):
     """An invalid setting.
 
     Attributes:
-        path: keys and indices to it, below the panel's own table.
+        path: keys and indices of the setting, below the table of the panel.
     """
 
     def __init__(self, path: Sequence[str | int], reason: str) -> None:
@@ -50,7 +50,7 @@ class SettingError(ValueError):
 
 
 class WorkspaceError(ValueError):
-    """A file that cannot be used or written; one line, with its name."""
+    """A file that cannot be used or written. The message is one line with the name of the file."""
 
 
 class Workspace:
@@ -58,10 +58,10 @@ class Workspace:
 
     Args:
         text: content of the file.
-        path: the file; None for settings that are not stored.
+        path: path of the file, or None for settings that are not stored.
 
     Raises:
-        WorkspaceError: the text is not TOML, and the message names the line; or tomlkit is not
+        WorkspaceError: the text is not TOML, and the message names the line. Or tomlkit is not
             installed.
     """
 
@@ -84,10 +84,10 @@ class Workspace:
 
     @classmethod
     def read(cls, path: Path) -> Workspace:
-        """Read a file; a file that does not exist yet is an empty workspace.
+        """Read a file. A file that does not exist yet is an empty workspace.
 
         Raises:
-            WorkspaceError: it cannot be read, or is not TOML.
+            WorkspaceError: the file cannot be read, or is not TOML.
         """
         try:
             return cls(path.read_text("utf-8"), path)
@@ -103,10 +103,10 @@ class Workspace:
         return list(self._document)
 
     def section(self, name: str) -> dict[str, Any]:
-        """Return the settings of a section; empty if it is not there.
+        """Return the settings of a section, empty if the section does not exist.
 
         Raises:
-            WorkspaceError: it is no table.
+            WorkspaceError: the section is not a table.
         """
         found = self._document.unwrap().get(name, {})
         if not isinstance(found, dict):
@@ -114,30 +114,31 @@ class Workspace:
         return found
 
     def wrong(self, error: SettingError, section: str = "") -> WorkspaceError:
-        """Return the error of a setting with the line it stands on."""
+        """Return the error of a setting with the line of the setting."""
         path = (section, *error.path) if section else error.path
         place = read_toml(self._text).line_of(path)
         name = f"{section}.{error}" if section else str(error)
         return WorkspaceError(f"{self.path}, line {place}: {name}")
 
     def put(self, name: str, settings: Mapping[str, Any]) -> None:
-        """Set the settings of a section; a None value removes its key, other keys stay."""
+        """Set the settings of a section. A None value removes its key. Other keys stay."""
         if settings:
             _merge(self._document, {name: settings})
 
     @property
     def text(self) -> str:
-        """All of it, as it would be written."""
+        """The whole text, as it would be written."""
         return self._document.as_string()
 
     def write(self, *, over: bool = False) -> bool:
-        """Write the file if anything has changed; return whether it has.
+        """Write the file if anything has changed. Return whether it has changed.
 
         Args:
             over: whether to overwrite the file regardless of its present content.
 
         Raises:
-            WorkspaceError: it cannot be written, or has changed since it was last read or written.
+            WorkspaceError: the file cannot be written, or has changed since it was last read or
+                written.
         """
         text, path = self.text, self.path
         if path is None or (text == self._text and not over):
@@ -152,7 +153,7 @@ class Workspace:
         return True
 
     def _differs(self, path: Path) -> bool:
-        """Return whether a file differs from what was last read or written."""
+        """Return whether a file differs from the text that was last read or written."""
         try:
             return path.read_bytes() != self._text.encode()
         except FileNotFoundError:
@@ -164,7 +165,7 @@ def _reason(error: Exception) -> str:
 
 
 def _merge(table: Container | Table | Any, settings: Mapping[str, Any]) -> None:
-    """Set what differs; tables and arrays of tables are gone through key by key."""
+    """Set the values that differ. Tables and arrays of tables are compared key by key."""
     for key, value in settings.items():
         before = table.get(key)
         if value is None:
@@ -188,7 +189,7 @@ def _merge_array(tables: Any, values: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _given(value: Any) -> Any:
-    """Return a setting without what is None in it."""
+    """Return a setting without None values."""
     if isinstance(value, Mapping):
         return {name: _given(item) for name, item in value.items() if item is not None}
     return [_given(item) for item in value] if isinstance(value, list) else value
@@ -218,7 +219,7 @@ _LISTS: Final = ("source", "dbc", "eds_dir", "timing", "bus_kwargs")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MonitorSetup:
-    """Sources and files.
+    """Sources and files of the monitor.
 
     Attributes:
         source: SOURCE words.
@@ -236,10 +237,10 @@ class MonitorSetup:
 
     @classmethod
     def read(cls, workspace: Workspace) -> Self:
-        """Read what a workspace says.
+        """Read the sources and files of a workspace.
 
         Raises:
-            WorkspaceError: a setting is wrong; says its line.
+            WorkspaceError: a setting is wrong. The message names its line.
         """
         bus, nodes = workspace.section(_BUS), workspace.section(_NODES)
         folder = _folder(workspace)
@@ -263,7 +264,7 @@ class MonitorSetup:
         )
 
     def under(self, other: MonitorSetup) -> MonitorSetup:
-        """Return it with what another one says before it."""
+        """Return the setup, with precedence for the values of another setup."""
         options = self.options if not other.source else BusOptions(bitrate=self.options.bitrate)
         given = {name: value for name in _OPTIONS if (value := getattr(other.options, name))}
         return MonitorSetup(
@@ -275,7 +276,7 @@ class MonitorSetup:
         )
 
     def write(self, workspace: Workspace) -> None:
-        """Put it into a workspace; what it does not have is taken out."""
+        """Write the setup to a workspace. Values that the setup lacks are removed."""
         bus: dict[str, Any] = {
             name: (list(value) if isinstance(value, tuple) else value) or None
             for name in _OPTIONS
@@ -305,7 +306,7 @@ def _folder(workspace: Workspace) -> Path:
 
 
 def _is_text(value: object) -> TypeGuard[str]:
-    """Return whether a value is a text that a command line may have: without NUL."""
+    """Return whether a value is a text that a command line may contain, which has no NUL."""
     return isinstance(value, str) and "\0" not in value
 
 
@@ -350,37 +351,37 @@ def _is_log(word: str) -> bool:
 
 
 def _relative(workspace: Workspace, word: str, *, is_path: bool = False) -> str:
-    """Write a path as seen from the workspace's folder."""
+    """Return a path relative to the folder of the workspace."""
     if not is_path and not _is_log(word):
         return word
     return os.path.relpath(Path(word).resolve(), _folder(workspace).resolve())
 
 
 _FRAME: Final = (_BUS, _NODES)
-"""Sections that are no panel's."""
+"""Sections that do not belong to a panel."""
 
 
 class _Kept(Protocol):
-    """What has settings in a workspace, as a panel."""
+    """An object with settings in a workspace, such as a panel."""
 
     @property
     def section(self) -> str:
-        """Its table."""
+        """Name of the object's table."""
 
     def load(self, settings: Mapping[str, Any], /) -> None:
-        """Take settings; SettingError if one is wrong."""
+        """Load settings. Raise SettingError if a setting is wrong."""
 
     def save(self) -> dict[str, Any]:
         """Return all its settings."""
 
 
 class PanelSettings:
-    """Restores settings, and stores them.
+    """Storage that restores and saves the settings of panels.
 
     Args:
-        workspace: where settings are stored.
-        setup: the buses and files in use.
-        panels: the panels with these settings.
+        workspace: workspace that stores the settings.
+        setup: buses and files in use.
+        panels: panels with these settings.
     """
 
     def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
@@ -388,10 +389,10 @@ class PanelSettings:
         self._conflict = ""
 
     def load(self) -> None:
-        """Give each panel its settings.
+        """Pass its settings to each panel.
 
         Raises:
-            WorkspaceError: a setting is wrong; says its line.
+            WorkspaceError: a setting is wrong. The message names its line.
         """
         for panel in self._panels:
             try:
@@ -400,7 +401,7 @@ class PanelSettings:
                 raise self.workspace.wrong(error, panel.section) from None
 
     def unknown(self) -> list[str]:
-        """Return the unknown settings of the workspace; they stay in the file."""
+        """Return the unknown settings of the workspace. They stay in the file."""
         known = {panel.section: set(panel.save()) for panel in self._panels}
         words = [name for name in self.workspace.sections() if name not in (*_FRAME, *known)]
         for name, keys in known.items():
@@ -408,9 +409,9 @@ class PanelSettings:
         return words
 
     def save(self) -> str:
-        """Write changed settings; return an error only once.
+        """Write changed settings. Return an error only once.
 
-        If another program has changed the file, it is not written until the user exports the
+        If another program has changed the file, the file is not written until the user exports the
         settings.
         """
         self._put()
@@ -423,10 +424,10 @@ class PanelSettings:
         return ""
 
     def export(self, path: Path) -> None:
-        """Write all to a file, and keep it there from now on.
+        """Write all settings to a file, and use this file from now on.
 
         Raises:
-            WorkspaceError: it cannot be written.
+            WorkspaceError: the file cannot be written.
         """
         before, self.workspace.path = self.workspace.path, path
         self._put()
@@ -443,7 +444,7 @@ class PanelSettings:
 
 
 def truth(settings: Mapping[str, Any], name: str, default: bool) -> bool:
-    """Return what is true or false; SettingError if it is neither."""
+    """Return a boolean. Raise SettingError if the value is not a boolean."""
     value = settings.get(name, default)
     if not isinstance(value, bool):
         raise SettingError((name,), f"{value!r} is neither true nor false")
@@ -451,7 +452,7 @@ def truth(settings: Mapping[str, Any], name: str, default: bool) -> bool:
 
 
 def text_of(settings: Mapping[str, Any], name: str, default: str) -> str:
-    """Return a text; SettingError if it is none."""
+    """Return a text. Raise SettingError if the value is not a text."""
     value = settings.get(name, default)
     if not isinstance(value, str):
         raise SettingError((name,), f"{value!r} is no text")
@@ -459,7 +460,7 @@ def text_of(settings: Mapping[str, Any], name: str, default: str) -> str:
 
 
 def choice(settings: Mapping[str, Any], name: str, default: str, known: Sequence[str]) -> str:
-    """Return one of some texts; SettingError if it is not one of them."""
+    """Return one of some texts. Raise SettingError if the value is not one of them."""
     value = settings.get(name, default)
     if value not in known:
         raise SettingError((name,), f"{value!r} is not one of {', '.join(known)}")
@@ -467,7 +468,7 @@ def choice(settings: Mapping[str, Any], name: str, default: str, known: Sequence
 
 
 def tables(settings: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    """Return an array of tables, empty if it is not there; SettingError if it is none."""
+    """Return an array of tables, empty if it is missing. Raise SettingError for other values."""
     value = settings.get(name, [])
     if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
         raise SettingError((name,), f"is no array of tables [[{name}]]")
@@ -475,7 +476,7 @@ def tables(settings: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
 
 
 def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """Return a list of texts, empty if it is not there; SettingError if it is none."""
+    """Return a list of texts, empty if it is missing. Raise SettingError for other values."""
     value = settings.get(name, [])
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
         raise SettingError((name,), f"{value!r} is no list of texts")
@@ -498,9 +499,11 @@ def below(*path: str | int) -> Iterator[None]:
 
 
 def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
-    """Return the bus that settings name, empty for the first; SettingError if it does not exist.
+    """Return the bus in settings, empty for the first bus.
 
-    A log has no buses; any name is then valid.
+    Raise SettingError if there is no such bus.
+
+    A log has no buses, and any name is then valid.
     """
     bus = text_of(settings, "bus", "")
     if bus and buses and bus not in buses:

@@ -191,7 +191,7 @@ class BitRow(NamedTuple):
 
     Attributes:
         latest: bits in which the latest payload differs from the previous payload.
-        planes: plane n holds bit n of the change count of each payload bit.
+        planes: change counts of the payload bits. Plane n holds bit n of each count.
         notched: bits whose changes are known, and therefore not shown.
     """
 
@@ -201,13 +201,13 @@ class BitRow(NamedTuple):
 
     @property
     def changed(self) -> int:
-        """All bits that ever changed and are not notched."""
+        """Bits that have ever changed and are not notched."""
         return reduce(or_, self.planes, 0) & ~self.notched
 
     def counts(self) -> tuple[int, ...]:
         """Return the number of changes of each bit.
 
-        These are 64 bits; in CAN FD, all bits up to the highest changed one.
+        The result has 64 counts, or in CAN FD the counts of all bits up to the highest changed one.
 
         >>> BitRow(planes=(0b01, 0b11)).counts()[:3]
         (3, 2, 0)
@@ -220,7 +220,7 @@ class BitRow(NamedTuple):
 
 
 class BitMemory:
-    """Counts the changes of all bits at once: each big number holds one binary digit of all counts.
+    """Change counts of all bits at once. Each big number holds one binary digit of all counts.
 
     A payload that is shorter than the previous one is padded with zeros.
 
@@ -235,7 +235,7 @@ class BitMemory:
         self._planes: list[int] = []
 
     def take(self, payload: int) -> None:
-        """Compare a payload with the one before."""
+        """Compare a payload with the previous one."""
         self._latest = carry = payload ^ self._payload
         self._payload = payload
         planes, place = self._planes, 0
@@ -246,15 +246,15 @@ class BitMemory:
             place += 1
 
     def same(self) -> None:
-        """Note that the payload came again as it was."""
+        """Record that the payload was repeated without a change."""
         self._latest = 0
 
     def notch(self) -> None:
-        """Take all bits that have changed as known."""
+        """Treat all bits that have changed as known."""
         self.notched |= reduce(or_, self._planes, 0)
 
     def row(self) -> BitRow:
-        """Return what changed."""
+        """Return the changes."""
         return BitRow(self._latest, tuple(self._planes), self.notched)
 
 
@@ -262,16 +262,16 @@ class IdRow(NamedTuple):
     """The traffic of one identifier on one bus.
 
     Attributes:
-        channel: the bus.
-        ident: see `ident_of` and `fd_ident`.
+        channel: name of the bus.
+        ident: identifier as in `ident_of` and `fd_ident`.
         frames: number of frames.
         first_us: time of the first frame.
         last_us: time of the latest frame.
-        frame: the latest frame.
-        gap_us: the latest gap; None before the second frame.
-        gaps: all gaps, None before the second frame.
-        bits: number of bits of all frames on the bus; CAN FD frames count as in `BitRates`.
-        changed: which payload bits change.
+        frame: latest frame of the identifier.
+        gap_us: latest gap, or None before the second frame.
+        gaps: statistics of all gaps, or None before the second frame.
+        bits: number of bits of all frames on the bus. CAN FD frames count as in `BitRates`.
+        changed: changes of the payload bits.
     """
 
     channel: str
@@ -287,24 +287,24 @@ class IdRow(NamedTuple):
 
     @property
     def rate_hz(self) -> float:
-        """Frames a second, from the first to the latest; 0 if that took no time."""
+        """Frames per second from the first to the latest frame, or 0 if that took no time."""
         span_us = self.last_us - self.first_us
         return (self.frames - 1) * 1e6 / span_us if span_us > 0 else 0.0
 
 
 class _IdTally:
-    """Counts the frames of one identifier on one bus.
+    """Counter for the frames of one identifier on one bus.
 
-    A frame with an earlier time than the previous one has a gap of 0.
+    A frame with an earlier time than the previous frame has a gap of 0.
 
     Args:
         at_us: time of the first frame.
-        frame: the first frame; the following frames are of the same kind.
-        measure: returns its number of bits on the bus.
+        frame: first frame. The following frames are of the same kind.
+        measure: function that returns the number of bits of a frame on the bus.
 
     Attributes:
         length: number of bits of the latest frame on the bus.
-        memory: which payload bits change.
+        memory: changes of the payload bits.
     """
 
     __slots__ = (
@@ -325,7 +325,7 @@ class _IdTally:
         self.memory = BitMemory(int.from_bytes(frame.data, "little"))
 
     def take(self, at_us: int, frame: can.CanFrame | can.FdFrame) -> None:
-        """Count a frame after the first."""
+        """Count a frame after the first one."""
         gap_us = self._gap_us = max(0, at_us - self._last_us)
         self._last_us = at_us
         self._gaps.take(gap_us)
@@ -337,7 +337,7 @@ class _IdTally:
         self._bits += self.length
 
     def row(self, channel: str, ident: int) -> IdRow:
-        """Return what was counted."""
+        """Return the counts."""
         return IdRow(
             channel,
             ident,
@@ -353,7 +353,7 @@ class _IdTally:
 
 
 class BitRates(NamedTuple):
-    """Bit rates in bit/s; None if unknown.
+    """Bit rates in bit/s, with None for unknown rates.
 
     Attributes:
         nominal: bit rate of the arbitration phase, and of a whole classic frame.
@@ -370,7 +370,7 @@ class BitRates(NamedTuple):
     def bits(self, frame: can.FdFrame) -> int:
         """Return the duration of a frame, in bits of the nominal rate, rounded up.
 
-        If a rate is unknown, fast bits count as nominal ones. The frame is then in fact shorter.
+        If a rate is unknown, fast bits count as nominal bits. The frame is then in fact shorter.
         """
         nominal, fast = can.fd_bits(frame)
         if self.nominal and self.fast:
@@ -392,11 +392,11 @@ class _ErrorRow(NamedTuple):
 
     Attributes:
         frames: number of error frames.
-        state: state of the local controller in the latest of them; None if unknown.
-        tec: its transmit error counter, None if unknown.
-        rec: its receive error counter, None if unknown.
-        overflows: number of overflows of its receive buffer, which lose frames.
-        kinds: their kinds with counts, the most frequent first.
+        state: state of the local controller in the latest error frame, or None if unknown.
+        tec: transmit error counter of the local controller, or None if unknown.
+        rec: receive error counter of the local controller, or None if unknown.
+        overflows: number of overflows of the controller's receive buffer, which lose frames.
+        kinds: kinds of the error frames with counts. The most frequent kind is first.
     """
 
     frames: int = 0
@@ -408,7 +408,7 @@ class _ErrorRow(NamedTuple):
 
 
 class ErrorStatistics:
-    """Follows the error frames of a bus."""
+    """Statistics of the error frames of a bus."""
 
     __slots__ = ("_frames", "_kinds", "_overflows", "_rec", "_state", "_tec")
 
@@ -432,7 +432,7 @@ class ErrorStatistics:
             self._overflows += 1
 
     def row(self) -> _ErrorRow:
-        """Return what they were."""
+        """Return the statistics of the error frames."""
         kinds = sorted(self._kinds.items(), key=lambda item: (-item[1], item[0]))
         return _ErrorRow(
             self._frames, self._state, self._tec, self._rec, self._overflows, tuple(kinds)
@@ -448,7 +448,7 @@ def _is_overflow(frame: can.ErrorFrame) -> bool:
 
 
 def _state_after(frame: can.ErrorFrame) -> can.ErrorState | None:
-    """Return the state of our controller after an error frame; None if it does not say."""
+    """Return the state of the local controller after an error frame, or None if it is unknown."""
     if frame.error_class & can.ErrorClass.BUS_OFF:
         return can.ErrorState.BUS_OFF
     flags = frame.data[can.CONTROLLER_BYTE] if frame.error_class & can.ErrorClass.CONTROLLER else 0
@@ -466,8 +466,8 @@ class BusSecond(NamedTuple):
     """A second of a bus.
 
     Attributes:
-        at_us: its begin.
-        bits: how many bits of frames ended in it.
+        at_us: begin of the second.
+        bits: number of bits of the frames that ended in this second.
     """
 
     at_us: int
@@ -479,8 +479,8 @@ class _LoadRow(NamedTuple):
 
     Attributes:
         bits: bits of all frames.
-        latest: the latest complete second; during the first second, that one.
-        peak: the busiest second; the first one of several.
+        latest: latest complete second, or the first second while it lasts.
+        peak: busiest second, or the first of several equally busy seconds.
         mean_bit_s: mean bits per second, from the first window to the one with the latest frame.
     """
 
@@ -491,9 +491,9 @@ class _LoadRow(NamedTuple):
 
 
 class Load:
-    """Adds up the bits of each second, counted from the first frame.
+    """Sum of the bits of each second, counted from the first frame.
 
-    A frame with an earlier time than a previous one counts for the present window.
+    A frame with an earlier time than a previous frame counts for the present window.
     """
 
     __slots__ = ("_bits", "_ended", "_first_us", "_open", "_peak")
@@ -506,7 +506,7 @@ class Load:
         """Count a frame.
 
         Returns:
-            The window that its time has ended, if any.
+            The window that the time of the frame has ended, if any.
         """
         self._bits += bits
         begin_us, before = self._open
@@ -519,11 +519,11 @@ class Load:
         return ended
 
     def end(self) -> BusSecond:
-        """Return the window that is open."""
+        """Return the open window."""
         return self._open
 
     def row(self, now_us: int) -> _LoadRow:
-        """Return how busy the bus was until now."""
+        """Return the load of the bus until now."""
         windows = (self._open.at_us - self._first_us) // WINDOW_US + 1
         return _LoadRow(
             self._bits,
@@ -541,12 +541,12 @@ class Load:
 
 
 def _window_begin(first_us: int, at_us: int) -> int:
-    """Return the begin of the window of a time."""
+    """Return the begin of the window that contains a time."""
     return at_us - (at_us - first_us) % WINDOW_US
 
 
 def _busier(first: BusSecond, second: BusSecond) -> BusSecond:
-    """Return the window with more bits, the first if they have the same."""
+    """Return the window with more bits, or the first window if the bits are equal."""
     return second if second.bits > first.bits else first
 
 
@@ -554,16 +554,16 @@ class BusRow(NamedTuple):
     """The traffic of one bus.
 
     Attributes:
-        channel: its name.
-        frames: data and remote frames.
+        channel: name of the bus.
+        frames: number of data and remote frames.
         first_us: time of the first frame or error frame.
-        last_us: time of the latest one.
-        load: its load.
-        errors: its error frames.
-        went_back: number of frames with an earlier time than the one before.
+        last_us: time of the latest frame or error frame.
+        load: load of the bus.
+        errors: statistics of the error frames.
+        went_back: number of frames with an earlier time than the previous frame.
         fd: number of CAN FD frames.
-        unrated: number of CAN FD frames with data at an unknown bit rate; if not 0, the load is
-            lower than reported.
+        unrated: number of CAN FD frames with data at an unknown bit rate. If it is not 0, the real
+            load is higher than the reported load.
     """
 
     channel: str
@@ -578,12 +578,12 @@ class BusRow(NamedTuple):
 
 
 class TrafficSnapshot(NamedTuple):
-    """All rows at one moment; they never change.
+    """All rows at one moment. They never change.
 
     Attributes:
-        at_us: the moment.
-        buses: by name.
-        rows: by bus and identifier.
+        at_us: moment of the snapshot.
+        buses: rows of the buses by name.
+        rows: rows of the identifiers by bus and identifier.
     """
 
     at_us: int = 0
@@ -592,7 +592,7 @@ class TrafficSnapshot(NamedTuple):
 
 
 class _BusTally:
-    """Counts one bus."""
+    """Counter for one bus."""
 
     def __init__(self, channel: str, first_us: int, rates: BitRates) -> None:
         self._channel = channel
@@ -626,12 +626,12 @@ class _BusTally:
         self._load.take(at_us, tally.length)
 
     def notch(self) -> None:
-        """Take all bits that have changed as known."""
+        """Treat all bits that have changed as known."""
         for tally in self._ids.values():
             tally.memory.notch()
 
     def row(self, now_us: int) -> BusRow:
-        """Return what the bus did."""
+        """Return the statistics of the bus."""
         return BusRow(
             self._channel,
             self._frames,
@@ -645,19 +645,19 @@ class _BusTally:
         )
 
     def id_rows(self) -> list[IdRow]:
-        """Return what its identifiers did, in their order."""
+        """Return the statistics of the identifiers in their order."""
         return [tally.row(self._channel, ident) for ident, tally in sorted(self._ids.items())]
 
 
 class Traffic:
-    """Counts all frames of all buses.
+    """Counter for all frames of all buses.
 
-    Its memory grows with the number of identifiers, not with the number of frames.
+    The memory of the counter grows with the number of identifiers, not with the number of frames.
 
-    Not counted: frames lost before they were read; see `Loss`.
+    Frames that were lost before they were read are not counted; see `Loss`.
 
     Args:
-        rates: bit rates of all buses, for CAN FD.
+        rates: bit rates of all buses, used for CAN FD.
     """
 
     def __init__(self, rates: BitRates = NO_RATES) -> None:
@@ -675,11 +675,11 @@ class Traffic:
         self._last_us = at_us
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Delete all counts."""
         self._buses.clear()
 
     def notch(self) -> None:
-        """Take all bits that have changed as known: only others are shown from now on."""
+        """Treat all bits that have changed as known. From now on, only other bits are shown."""
         for bus in self._buses.values():
             bus.notch()
 
@@ -687,7 +687,7 @@ class Traffic:
         """Return all rows.
 
         Args:
-            now_us: the time; that of the latest frame if it is not given.
+            now_us: current time. By default, it is the time of the latest frame.
         """
         at_us = self._last_us if now_us is None else now_us
         buses = [self._buses[name] for name in sorted(self._buses)]
@@ -695,5 +695,5 @@ class Traffic:
         return TrafficSnapshot(at_us, self.buses(at_us), rows)
 
     def buses(self, now_us: int) -> tuple[BusRow, ...]:
-        """Return the rows of the buses alone, which takes less time."""
+        """Return only the rows of the buses, which takes less time."""
         return tuple(self._buses[name].row(now_us) for name in sorted(self._buses))

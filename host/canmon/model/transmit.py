@@ -4,7 +4,8 @@
 >>> words.every, words.counters, words.name, str(words)
 ('10ms', ('0:0..14',), 'alive', '123#00 --every 10ms --counter 0:0..14 --name alive')
 
-Fields of a cyclic frame that change each time: a counter and a checksum.
+The module also implements fields of a cyclic frame that change each time, which are a counter and a
+checksum.
 
 >>> counter, checksum = parse_counter("0:0..3"), parse_checksum("3:xor")
 >>> [checksum.put(counter.put(bytes(4), n)).hex() for n in range(5)]
@@ -57,14 +58,14 @@ have the initial value 0xFF; crcmod requires this value after the final xor.
 
 @dataclass(frozen=True, slots=True)
 class _Counter:
-    """Bits of one byte that count up, and start again after the end.
+    """Bits of one byte that count up, and start again after their last value.
 
     Attributes:
-        byte: number of the byte.
-        shift: its lowest bit in that byte.
+        byte: number of the byte in the data.
+        shift: number of the lowest bit in that byte.
         bits: number of bits.
-        low: its first value.
-        high: its last value.
+        low: first value of the counter.
+        high: last value of the counter.
     """
 
     byte: int
@@ -74,7 +75,7 @@ class _Counter:
     high: int
 
     def put(self, data: bytes, number: int) -> bytes:
-        """Return the data of the frame with this number, counted from 0."""
+        """Return the data of the frame with this number, which counts from 0."""
         value = self.low + number % (self.high - self.low + 1)
         mask = (1 << self.bits) - 1 << self.shift
         byte = data[self.byte] & ~mask | value << self.shift
@@ -83,14 +84,14 @@ class _Counter:
 
 @dataclass(frozen=True, slots=True)
 class _ChecksumField:
-    """One byte that is computed from others.
+    """One byte that is computed from other bytes.
 
     Attributes:
-        byte: number of the byte.
-        algorithm: a name of `ALGORITHMS`.
+        byte: number of the byte in the data.
+        algorithm: name of the algorithm, from `ALGORITHMS`.
         first: first byte that the checksum covers.
-        last: last byte that it covers; None for the last byte of the frame. `byte` itself is never
-            covered.
+        last: last byte that the checksum covers, or None for the last byte of the frame. The
+            checksum never covers `byte` itself.
     """
 
     byte: int
@@ -108,7 +109,7 @@ class _ChecksumField:
 
 @dataclass(frozen=True, slots=True)
 class FrameFields:
-    """The changing fields of a frame; checksums come after counters, in their order."""
+    """The changing fields of a frame. Checksums come after counters, in their order."""
 
     counters: tuple[_Counter, ...] = ()
     checksums: tuple[_ChecksumField, ...] = ()
@@ -124,7 +125,7 @@ class FrameFields:
             )
 
     def put(self, data: bytes, number: int) -> bytes:
-        """Return the data of the frame with this number, counted from 0."""
+        """Return the data of the frame with this number, which counts from 0."""
         for counter in self.counters:
             data = counter.put(data, number)
         for checksum in self.checksums:
@@ -139,7 +140,7 @@ def parse_counter(text: str) -> _Counter:
     from 0 to 14.
 
     Raises:
-        ValueError: not a counter, or its values do not fit its bits.
+        ValueError: the text is not a counter, or the values do not fit the bits.
     """
     match = _COUNTER.fullmatch(text)
     if match is None:
@@ -156,10 +157,10 @@ def parse_counter(text: str) -> _Counter:
 
 
 def parse_checksum(text: str) -> _ChecksumField:
-    """Read `BYTE:ALGORITHM`, as `7:crc8`, or over some bytes `7:crc8:1..6`.
+    """Read `BYTE:ALGORITHM`, such as `7:crc8`, or with a range of bytes, such as `7:crc8:1..6`.
 
     Raises:
-        ValueError: not a checksum.
+        ValueError: the text is not a checksum.
     """
     match = _CHECKSUM.fullmatch(text)
     if match is None:
@@ -187,13 +188,13 @@ class _Place(NamedTuple):
 
 
 class PdoFrames:
-    """Makes frames from the names that users give.
+    """Factory that makes frames from the names that users give.
 
     An object that is not named gets its stored value, or else its power-on value, or else 0. Values
     are those on the wire, without scaling.
 
     Args:
-        eds: contents of EDS files, by node-ID.
+        eds: content of EDS files by node-ID.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
@@ -201,7 +202,10 @@ class PdoFrames:
         self._remembered: dict[str, dict[str, int]] = {}
 
     def remember(self, text: str) -> None:
-        """Take the values of a frame that is sent: they count where others are not named."""
+        """Store the values of a sent frame.
+
+        They are used for objects that a later frame does not name.
+        """
         pdo, (_, fields) = text.split(maxsplit=1)[0].lower(), self._fields(text)
         self._remembered[pdo] = {place.name: value for place, value in fields}
 
@@ -209,13 +213,14 @@ class PdoFrames:
         """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
 
         Raises:
-            ValueError: unknown node, PDO, object or value; the message names the known ones.
+            ValueError: a node, PDO, object or value is unknown. The message contains the known
+                ones.
         """
         can_id, fields = self._fields(text)
         return CanFrame(can_id, pack_bits([(value, place.mapped.bits) for place, value in fields]))
 
     def _fields(self, text: str) -> tuple[int, list[tuple[_Place, int]]]:
-        """Return the CAN-ID, and the value of each object; ValueError as `frame`."""
+        """Return the CAN-ID, and the value of each object. Raise ValueError as `frame` does."""
         pdo, *settings = text.split()
         match = _PDO.fullmatch(pdo)
         if match is None:
@@ -269,7 +274,7 @@ def _values(
 
 
 def _named(places: list[_Place], name: str, pdo: str) -> _Place:
-    """Return the object that has this name, or the only one that begins with it."""
+    """Return the object with this name, or the only object whose name begins with it."""
     found = [place for place in places if place.name == name.lower()]
     found = found or [place for place in places if place.name.startswith(name.lower())]
     if len(found) != 1:
@@ -281,7 +286,7 @@ def _named(places: list[_Place], name: str, pdo: str) -> _Place:
 
 
 def _number(place: _Place, value: Setting) -> int:
-    """Return the bits of a value; FieldError if it does not fit the object's type."""
+    """Return the bits of a value. Raise FieldError if it does not fit the type of the object."""
     kind, bits = place.text.kind, place.mapped.bits
     if kind is None or kind.bits != bits:
         kind = None
@@ -297,29 +302,29 @@ def _number(place: _Place, value: Setting) -> int:
 AnyFrames = tuple[CanFrame | FdFrame, ...]
 
 _ONCE: Final = 0
-"""In place of a period: a row that is sent on request."""
+"""Value in place of a period, for a row that is sent on request."""
 
 
 @dataclass(slots=True)
 class TransmitRow:
-    """A frame that is sent by hand, or cyclically without drift: its deadlines are absolute.
+    """A frame that is sent by hand, or cyclically without drift. Its deadlines are absolute.
 
-    A completely missed period is only counted; its frame is not sent later.
+    A completely missed period is only counted. The frame of that period is not sent later.
 
     Args:
-        name: its name.
-        frame: the frame to send.
-        period_us: period of a cyclic row; `_ONCE` for a row that is sent by hand.
+        name: name of the row.
+        frame: frame to send.
+        period_us: period of a cyclic row, or `_ONCE` for a row that is sent by hand.
         fields: fields that change each time.
-        due_us: time of the next transmission; `NEVER` while the row is not enabled.
-        count: number of transmissions, 0 for no limit.
+        due_us: time of the next transmission. It is `NEVER` while the row is not enabled.
+        count: number of transmissions, or 0 for no limit.
 
     Attributes:
         sent: number of past transmissions.
         missed: number of periods without a transmission.
 
     Raises:
-        ValueError: a period below 0, or a field that is not in the frame.
+        ValueError: the period is below 0, or a field is not in the frame.
     """
 
     name: str
@@ -339,14 +344,14 @@ class TransmitRow:
 
     @property
     def enabled(self) -> bool:
-        """Whether it is sent cyclically."""
+        """Whether the row is sent cyclically."""
         return self.due_us < NEVER
 
     def enable(self, now_us: int) -> None:
-        """Send it from now on in each period; counters go on where they were.
+        """Send the row in each period from now on. Counters continue where they were.
 
         Raises:
-            ValueError: it has no period.
+            ValueError: the row has no period.
         """
         if self.period_us == _ONCE:
             raise ValueError(f"{self.name} has no period")
@@ -354,17 +359,17 @@ class TransmitRow:
             self.due_us = now_us
 
     def disable(self) -> None:
-        """Send it no more."""
+        """Stop sending the row."""
         self.due_us = NEVER
 
     def once(self) -> AnyFrames:
-        """Return it, to be sent now."""
+        """Return the frame to send now."""
         data = self.fields.put(self.frame.data, self.sent)
         self.sent += 1
         return (self.frame._replace(data=data),)
 
     def tick(self, now_us: int) -> AnyFrames:
-        """Return it if it is due."""
+        """Return the frame if it is due."""
         if now_us < self.due_us:
             return ()
         late = (now_us - self.due_us) // self.period_us
@@ -378,13 +383,13 @@ class TransmitRow:
 
 @dataclass(slots=True)
 class TransmitList:
-    """Rows, and the key that arms them.
+    """Rows that can be sent when the list is armed.
 
-    Nothing is sent until the list is armed. Stopping disarms it and disables all rows, so that
-    arming it again sends nothing by itself.
+    Nothing is sent until the list is armed. `stop` disarms the list and disables all rows, so that
+    arming the list again sends nothing by itself.
 
     Args:
-        rows: the frames.
+        rows: rows of the list.
 
     Attributes:
         armed: whether rows may send.
@@ -395,27 +400,27 @@ class TransmitList:
 
     @property
     def due_us(self) -> int:
-        """When a row is sent next."""
+        """Time of the next transmission of a row."""
         return min((row.due_us for row in self.rows), default=NEVER)
 
     def stop(self) -> None:
-        """Send nothing more, whatever was enabled."""
+        """Stop sending all rows."""
         self.armed = False
         for row in self.rows:
             row.disable()
 
     def enable(self, number: int, now_us: int) -> None:
-        """Send a row in each period from now on; ValueError if that must not be."""
+        """Send a row in each period from now on. Raise ValueError if that is not allowed."""
         self._check_armed()
         self.rows[number].enable(now_us)
 
     def once(self, number: int) -> AnyFrames:
-        """Return a row, to be sent now; ValueError if it is not armed."""
+        """Return the frame of a row to send now. Raise ValueError if the list is not armed."""
         self._check_armed()
         return self.rows[number].once()
 
     def tick(self, now_us: int) -> AnyFrames:
-        """Return what is due, in the order of the rows."""
+        """Return the due frames in the order of the rows."""
         return tuple(frame for row in self.rows for frame in row.tick(now_us))
 
     def _check_armed(self) -> None:
@@ -446,14 +451,14 @@ _OPTIONS: Final = ("every", "counter", "checksum", "name")
 
 @dataclass(frozen=True, slots=True)
 class RowText:
-    """The text of a row, in its parts.
+    """The parts of the text of a row.
 
     Attributes:
         frame: a frame such as `123#DEADBEEF`, or a PDO such as `5.rpdo1 target_velocity=100`.
-        every: its period, such as `10ms`; empty for a row that is sent by hand.
+        every: period of the row, such as `10ms`, empty for a row that is sent by hand.
         counters: bytes that count, such as `0:0..255`.
         checksums: bytes that are computed, such as `7:crc8`.
-        name: its displayed name; empty to show its frame.
+        name: displayed name of the row, empty to show the frame.
     """
 
     frame: str
@@ -463,7 +468,7 @@ class RowText:
     name: str = ""
 
     def __str__(self) -> str:
-        """Write it in one line."""
+        """Return the text of the row as one line."""
         words = [self.frame]
         words += ["--every", self.every] if self.every else []
         words += [word for counter in self.counters for word in ("--counter", counter)]
@@ -472,10 +477,10 @@ class RowText:
         return " ".join(words)
 
     def row(self, pdos: PdoFrames) -> TransmitRow:
-        """Return the frame to send.
+        """Return the row with the frame to send.
 
         Raises:
-            ValueError: an invalid frame, time or field.
+            ValueError: a frame, time or field is invalid.
         """
         is_frame = "#" in self.frame
         frame = CanFrame.parse(self.frame) if is_frame else pdos.frame(self.frame)
@@ -489,9 +494,9 @@ class RowText:
 
 
 def parse_row_text(text: str) -> RowText:
-    """Read a row; ValueError if it is none.
+    """Read the text of a row. Raise ValueError if it is not a row.
 
-    What it says is not checked; `RowText.row` does that.
+    The contents of the parts are not checked here. `RowText.row` checks them.
     """
     try:
         words = iter(shlex.split(text))

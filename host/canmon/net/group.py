@@ -1,4 +1,4 @@
-"""The verb `net`: set up a CANopen network."""
+"""The verb group `net`, which sets up a CANopen network."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ _ANSWER_US: Final = 500_000
 
 @dataclass(frozen=True, slots=True)
 class NetCall:
-    """Options before the verb.
+    """The options before the verb.
 
     Attributes:
-        word: SOURCE; None if the options name a bus.
-        bus: options of a bus.
+        word: SOURCE word, or None if the options name a bus.
+        bus: options of the bus.
         timeout_us: time-out for an answer.
     """
 

@@ -1,4 +1,4 @@
-"""The verb `net lss`: node-ID and bit rate over the bus."""
+"""The verb `net lss`, which sets node-ID and bit rate over the bus."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ _DEVICE_TYPE = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class LssSettings:
-    """Options of the command line.
+    """Options of `net lss` on the command line.
 
     Attributes:
-        address: address of the slave; None for slaves found by fastscan.
+        address: LSS address of the slave, or None for slaves found by fastscan.
         only_node: whether the command is for the only slave on the bus.
-        node_ids: new node-IDs, for one slave each; empty for none.
-        bit_rate: new bit rate in bit/s; None for no change.
-        delay_ms: delay for activating the bit rate; None for no activation.
-        store: whether to store both.
-        dry_run: whether to configure nothing.
+        node_ids: new node-IDs, one for each slave, or empty for none.
+        bit_rate: new bit rate in bit/s, or None for no change.
+        delay_ms: delay for activating the bit rate, or None for no activation.
+        store: whether the slave stores node-ID and bit rate.
+        dry_run: whether to leave the slaves unchanged.
     """
 
     address: LssAddress | None = None
@@ -49,7 +49,7 @@ class LssSettings:
 
     @property
     def configures(self) -> bool:
-        """Whether anything is to be changed."""
+        """Whether the settings change a slave."""
         return bool(self.node_ids or self.bit_rate or self.store)
 
     def steps(self, node_id: int | None) -> list[str]:
@@ -68,12 +68,12 @@ _MOST_FOUND: Final = 127
 
 
 class LssWork:
-    """One call.
+    """One call of `net lss`.
 
     Args:
-        session: the bus.
+        session: session with the open bus.
         master: LSS master on the bus.
-        settings: the request.
+        settings: options of the call.
     """
 
     def __init__(
@@ -82,11 +82,11 @@ class LssWork:
         self._session, self._master, self._settings = session, master, settings
 
     def run(self, *, yes: bool) -> None:
-        """Execute the request.
+        """Execute the call.
 
         Raises:
             Refused: a node-ID is in use, or the user declined.
-            NodeFailed: a slave refused, or there is none.
+            NodeFailed: a slave refused, or there is no slave.
         """
         settings = self._settings
         for node_id in settings.node_ids:
@@ -118,7 +118,7 @@ class LssWork:
         self._session.confirm(f"LSS: {', '.join(steps)} for {who}", yes=yes, risk=risk)
 
     def _check_free(self, node_id: int) -> None:
-        """Refuse a node-ID that is in use."""
+        """Raise Refused if a node-ID is in use."""
         try:
             self._session.bus.read(node_id, _DEVICE_TYPE, 0)
         except SdoAborted:
@@ -128,7 +128,7 @@ class LssWork:
         raise Refused(f"node-ID {node_id} is taken: a node answers there")
 
     def _configure_all(self) -> int:
-        """Configure one slave after the other; return their number."""
+        """Configure one slave after the other. Return the number of slaves."""
         ids = iter(self._settings.node_ids)
         found = 0
         for address, old_id in self._slaves():
@@ -140,7 +140,10 @@ class LssWork:
         return found
 
     def _show_slave(self, address: LssAddress, old_id: int) -> None:
-        """Show the found slave; NodeFailed if several with this identity are to be configured."""
+        """Show the found slave.
+
+        Raise NodeFailed if several slaves with its identity would be configured.
+        """
         count = self._master.count()
         shared = f", {count} nodes with this identity" if count > 1 else ""
         click.echo(f"{_text(address)}  {_id_text(old_id)}{shared}")
@@ -163,7 +166,7 @@ class LssWork:
             yield from self._scanned()
 
     def _scanned(self) -> Iterator[tuple[LssAddress, int]]:
-        """Yield the results of fastscans: a found slave is in configuration and stays silent."""
+        """Yield the results of fastscans. A found slave is in configuration and stays silent."""
         seen = set[LssAddress]()
         most = len(self._settings.node_ids) or _MOST_FOUND
         while len(seen) < most and (address := self._master.fastscan()) is not None:
@@ -197,7 +200,10 @@ class LssWork:
         say(f"done: {', '.join(steps)}")
 
     def _see_boot(self, node_id: int, old_id: int) -> None:
-        """Boot a slave without a node-ID with its new one; report when others take effect."""
+        """Boot a slave that had no node-ID with its new one.
+
+        For other slaves, report when it takes effect.
+        """
         if old_id != _UNCONFIGURED:
             say(f"node-ID {node_id} counts from its next reset: nmt reset-node {old_id}")
             return

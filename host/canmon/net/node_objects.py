@@ -1,4 +1,4 @@
-"""The objects of a node by name: from its EDS, else with names of CiA 301 and CiA 402."""
+"""The objects of a node by name, from its EDS, or else with names of CiA 301 and CiA 402."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from tickrig.wire.canopen.pdo import PdoDescription
 # Names of CiA 301 as an EDS writes them in full, for nodes of which there is none.
 
 _PDOS: Final = 64
-"""Number of PDOs with names in each direction."""
+"""Number of PDOs per direction that have names."""
 
 
 @cache
 def _standard_names() -> Mapping[str, tuple[int, int]]:
-    """Return index and sub-index of the communication objects by their names.
+    """Return index and sub-index of the communication objects by name.
 
     >>> _standard_names()["identity_object.product_code"] == (0x1018, 2)
     True
@@ -62,23 +62,23 @@ _ADDRESS: Final = re.compile(
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _DRIVE: Final = range(0x6000, 0x6100)
 _SUBS: Final = range(9)
-"""Objects with names in CiA 301, for use without an EDS."""
+"""Sub-indices of objects with names in CiA 301, used without an EDS."""
 
 
 class NamedObjects:
     """The known objects of one node.
 
     Args:
-        node_id: the node.
-        file: its EDS; None for no file.
-        known: content of the EDS, if known without a file.
-        name: name of that EDS.
+        node_id: node-ID of the node.
+        file: EDS of the node, or None for no file.
+        known: content of the EDS, if it is known without a file.
+        name: name of that known EDS.
 
     Attributes:
-        node_id: as given.
-        file: as given.
-        device: the device of the EDS.
-        rows: its entries, by index and sub-index.
+        node_id: node-ID of the node.
+        file: EDS of the node, or None for no file.
+        device: device that the EDS describes.
+        rows: entries of the device by index and sub-index.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class NamedObjects:
 
     @property
     def is_drive(self) -> bool:
-        """Whether it is known to be a drive of CiA 402."""
+        """Whether the node is known to be a CiA 402 drive."""
         return self._memory.is_drive
 
     def learn(self, entry: Entry, data: bytes) -> None:
@@ -112,19 +112,19 @@ class NamedObjects:
         return self._memory.describe(*entry)
 
     def size(self, entry: Entry) -> int:
-        """Return the size of an object in bytes, 0 if it varies or is unknown."""
+        """Return the size of an object in bytes, or 0 if the size varies or is unknown."""
         kind = self.text(entry).kind
         return 0 if kind is None else kind.size
 
     def title(self, entry: Entry) -> str:
-        """Write index, sub-index and name of an object."""
+        """Return index, sub-index and name of an object as text."""
         return f"{write_entry(entry)} {self.text(entry).name}".rstrip()
 
     def find(self, word: str) -> Entry:
-        """Return the object of a word: `statusword`, `1018h:1`, `0x6041`.
+        """Return the object that a word names, such as `statusword`, `1018h:1` or `0x6041`.
 
         Raises:
-            Refused: no such object.
+            Refused: the object does not exist.
         """
         if (entry := self._names.get(word.casefold())) is not None:
             return entry
@@ -180,14 +180,14 @@ def known_objects(
     what: str = "--eds",
     strict: bool = False,
 ) -> NamedObjects:
-    """Return the known objects of a node; its identity is read from it.
+    """Return the known objects of a node. The identity is read from the node.
 
     Args:
-        session: the bus.
-        node_id: the node.
-        eds: its EDS, or a folder that has it.
-        what: the option or argument that names it, for messages.
-        strict: whether to refuse an EDS of another device; otherwise warn.
+        session: session with the open bus.
+        node_id: node-ID of the node.
+        eds: EDS of the node, or a folder that contains the EDS.
+        what: option or argument that names the EDS, used in messages.
+        strict: whether to refuse an EDS of another device. Otherwise, print a warning.
 
     Raises:
         Refused: the EDS cannot be used.
@@ -224,7 +224,7 @@ def _device_type(session: NetSession, node_id: int) -> bytes:
 
 
 def _as_hex(data: bytes) -> str:
-    """Write a number of 32 bits."""
+    """Return a number of 32 bits in hex."""
     return f"{int.from_bytes(data, 'little'):08X}h"
 
 
@@ -244,7 +244,7 @@ _TYPES: Final = {
     "text": DataType.VISIBLE_STRING,
     "hex": DataType.OCTET_STRING,
 }
-"""Types written before a value without an EDS: `u16:5`."""
+"""Names of types that you can write before a value without an EDS, as in `u16:5`."""
 
 
 # Values of objects in the notation of users, and their comparison.
@@ -254,11 +254,17 @@ _TYPES: Final = {
 
 _STATUSWORD: Final = (0x6041, 0)
 _MOST_SHOWN: Final = 64
-"""Largest number of shown bytes of a domain; of longer ones only the size is shown."""
+"""Largest number of bytes of a domain that are shown.
+
+For a longer domain, only the size is shown.
+"""
 
 
 def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
-    """Write a value with its unit; integers also in hex, identifiers and bits only in hex."""
+    """Return a value with its unit as text.
+
+    Integers are also in hex, identifiers and bits only in hex.
+    """
     text = objects.text(entry)
     if len(data) > _MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
@@ -276,10 +282,10 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
 def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     """Return the bytes of a value.
 
-    A value is written as `100`, `0x64`, `u16:100`, or `-1.5` in the object's unit.
+    A value is written as `100`, `0x64`, `u16:100`, or `-1.5` in the unit of the object.
 
     Raises:
-        Refused: it is not a value of this object.
+        Refused: the text is not a value of the object.
     """
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
@@ -309,7 +315,7 @@ def _range(text: node_memory.ObjectText) -> str:
 
 
 def limits(objects: NamedObjects, entry: Entry) -> str:
-    """Return the range of a value in the EDS, for a message; empty without one."""
+    """Return the range of a value in the EDS, for a message. It is empty without a range."""
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):
         return ""
@@ -324,10 +330,10 @@ class _ValueDifference(NamedTuple):
     """An object with a different value.
 
     Attributes:
-        entry: index and sub-index.
-        wanted: wanted value, as on the wire.
-        found: present value, as on the wire; None if the node refuses the read.
-        why: reason for the refusal.
+        entry: index and sub-index of the object.
+        wanted: wanted value as bytes on the wire.
+        found: present value as bytes on the wire, or None if the node refuses the read.
+        why: reason why the node refuses the read.
     """
 
     entry: Entry
@@ -339,7 +345,7 @@ class _ValueDifference(NamedTuple):
 def differences(
     session: NetSession, objects: NamedObjects, values: Mapping[Entry, bytes]
 ) -> Iterator[_ValueDifference]:
-    """Read objects of a node, and yield those that differ; SdoTimeout if it does not answer."""
+    """Read objects of a node. Yield the objects that differ. Raise SdoTimeout without an answer."""
     for entry, wanted in sorted(values.items()):
         row = objects.rows.get(entry)
         if row is not None and not row.readable:

@@ -1,4 +1,4 @@
-"""The verbs of `canmon net` about nodes: scan, nmt, boot."""
+"""The verbs of `canmon net` about nodes, which are scan, nmt and boot."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ _REVISION: Final = (0x1018, 3)
 def _writing(
     paths: Mapping[str, Path | None], folders: tuple[Path, ...], *, force: bool
 ) -> EdsFolder | None:
-    """Return the folder of EDS files; Refused if a file cannot be written."""
+    """Return the folder of EDS files. Raise Refused if a file cannot be written."""
     wanted = {option: path for option, path in paths.items() if path is not None}
     if folders and wanted.keys() <= {"--rules"}:
         raise Refused("--eds-dir is for --write FILE, or --workspace FILE")
@@ -187,14 +187,14 @@ def _writing(
 
 
 def _eds_files(found: list[NodeFound], folder: EdsFolder, without: str) -> dict[int, Path | None]:
-    """Return the EDS of each node; None, and a line that begins with `without`, where none is."""
+    """Return the EDS of each node, or None with a line that begins with `without`."""
     return {node.node_id: _eds_of(node, folder, without) for node in found}
 
 
 def _write_workspace(
     path: Path, call: NetCall, files: Mapping[int, Path | None], folders: tuple[Path, ...]
 ) -> None:
-    """Write a workspace with the bus, the EDS of each node and the folders for others."""
+    """Write a workspace with the bus, the EDS of each node, and the folders for other nodes."""
     is_rig = call.word is not None and call.word.lower().endswith(RIG_FILE)
     if is_rig:
         say(one_line(f"{path}: canmon tui cannot open {call.word}: the workspace has no source"))
@@ -211,7 +211,7 @@ def _write_workspace(
 
 
 def _write_rules(path: Path, call: NetCall, found: list[NodeFound]) -> None:
-    """Write which nodes there are, their identities and heartbeats, as rules."""
+    """Write the nodes, their identities and their heartbeats as rules."""
     nodes = {node.node_id: (node.identity, node.heartbeat_ms) for node in found}
     head = [
         "Written by canmon net scan. Check a log against these rules: canmon check LOG FILE",
@@ -229,7 +229,10 @@ def _write_bus_file(
     files: Mapping[int, Path | None],
     folder: EdsFolder | None,
 ) -> None:
-    """Write the nodes that have an EDS; Refused, and nothing written, if it would have errors."""
+    """Write the nodes that have an EDS.
+
+    Raise Refused without writing if the file would have errors.
+    """
     taken = {node.node_id for node in found}
     master = next((one for one in (1, *range(127, 1, -1)) if one not in taken), None)
     if master is None:
@@ -259,7 +262,10 @@ def _write_bus_file(
 
 
 def _eds_of(node: NodeFound, folder: EdsFolder, without: str) -> Path | None:
-    """Return the EDS of a node; a line says which, or why there is none."""
+    """Return the EDS of a node.
+
+    Print a line with the chosen file, or the reason why there is none.
+    """
     identity = node_identity(node.identity[:3]) if node.answers else None
     if identity is None:
         say(f"node {node.node_id}: {without}it does not send vendor and product (1018h)")
@@ -273,7 +279,7 @@ def _eds_of(node: NodeFound, folder: EdsFolder, without: str) -> Path | None:
 
 
 def _node_lines(node: NodeFound, eds: Path, folder: Path) -> list[str]:
-    """Return the section of a node."""
+    """Return the section of a node as lines."""
     document = read_device_document(eds, "--eds-dir")
     name = slug(document.device.info.product_name or node.name)[:_MOST_LETTERS] or "node"
     if not _FIRST_LETTER.match(name):  # YAML takes 1_5 for a number
@@ -390,7 +396,7 @@ def _command_one(
 
 
 def _number(session: NetSession, node_id: int, index: int) -> int | None:
-    """Return an object, None if it cannot be read: a node in Stopped has no SDO."""
+    """Return the value of an object, or None if it cannot be read. A node in Stopped has no SDO."""
     try:
         return int.from_bytes(session.bus.read(node_id, index, 0), "little")
     except SdoAborted:
@@ -428,7 +434,7 @@ def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
     """Return the expectations of a bus.yml for a slave.
 
     Raises:
-        Refused: it cannot be read, has errors, or has no such slave.
+        Refused: the bus.yml cannot be read, has errors, or does not contain the slave.
     """
     try:
         bus = read_bus_file(path)
@@ -447,7 +453,7 @@ def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
 
 
 def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
-    """Return the expectations of an EDS: the device, and for a DCF its configuration.
+    """Return the expectations of an EDS, which are the device, and for a DCF the configuration.
 
     Revision and serial number of an EDS are those of one device and are not compared.
     """
@@ -476,7 +482,7 @@ def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
 
 
 def _risk(assignment: SlaveAssignment) -> str:
-    """Return the risk of the boot-up, for the question."""
+    """Return the risk of the boot-up, used in the question to the user."""
     resets = not assignment.reset_communication or assignment.restore_sub or assignment.program
     if resets:
         return nmt_risk(NmtCommand.RESET_NODE, assignment.device_type or None)
@@ -486,7 +492,7 @@ def _risk(assignment: SlaveAssignment) -> str:
 
 
 def _changes(assignment: SlaveAssignment) -> list[str]:
-    """Return the changes of the boot-up to the node, besides reading."""
+    """Return the changes that the boot-up makes to the node."""
     found = []
     if not assignment.reset_communication:
         found.append("reset communication, unless it is Operational")
@@ -500,7 +506,7 @@ def _changes(assignment: SlaveAssignment) -> list[str]:
 
 
 def _nothing_expected(node_id: int) -> SlaveAssignment:
-    """Return the default expectation: that the node answers."""
+    """Return the default expectation that the node answers."""
     say("no --bus and no --eds: nothing is expected of the node but that it answers")
     return SlaveAssignment(node_id)
 
@@ -586,7 +592,7 @@ def _expected(node: int, bus_file: Path | None, eds: Path | None) -> SlaveAssign
 
 
 def _step_printer(session: NetSession, *, shown: bool) -> _OnStep:
-    """Return what prints each step with its time, if they are to be shown."""
+    """Return a function that prints each step with its time, if steps are shown."""
     began_us = session.bus.now_us
 
     def show(step: boot_slave.BootStep) -> None:
@@ -608,13 +614,16 @@ def _check_status(node: int, status: BootStatus) -> None:
 _NOT_SENT: Final = "not sent"
 _NOT_AWAITED: Final = "not waited for"
 _COMMUNICATION: Final = 2
-"""Sub-index of 1011h for communication parameters alone."""
+"""Sub-index of 1011h for only the communication parameters."""
 _MOST_HEX: Final = 8
 """Largest number of bytes that are shown as a number."""
 
 
 def _explain(session: NetSession, slave: SlaveAssignment, *, start: bool) -> None:
-    """Show the boot-up of a node, and change nothing; NodeFailed if it would not boot."""
+    """Show the boot-up of a node without changing anything.
+
+    Raise NodeFailed if it would not boot.
+    """
     node, on_step = slave.node_id, _step_printer(session, shown=True)
     talk = boot_slave.BootTalk(on_step)
     status = session.bus.run(node, _explained(slave, talk, on_step))
@@ -627,7 +636,10 @@ def _explain(session: NetSession, slave: SlaveAssignment, *, start: bool) -> Non
 def _explained(
     slave: SlaveAssignment, talk: boot_slave.BootTalk, on_step: _OnStep
 ) -> Script[BootStatus]:
-    """Read what the boot-up reads, and show what it would write; return how it would end."""
+    """Read what the boot-up reads.
+
+    Show what it would write. Return the outcome that it would have.
+    """
     identity = replace(
         SlaveAssignment(slave.node_id, boots=slave.boots, device_type=slave.device_type),
         vendor_id=slave.vendor_id,
@@ -655,7 +667,7 @@ def _explained(
 
 
 def _explain_state(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[bool]:
-    """Return whether the node is Operational and would be left alone."""
+    """Return whether the node is Operational and would not be changed."""
     if slave.heartbeat_us:
         wait_us, status = slave.heartbeat_us, BootStatus.NO_HEARTBEAT
         state = yield from talk.report("state by heartbeat", wait_us, status)
@@ -670,7 +682,7 @@ def _explain_state(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[
 
 
 def _explain_software(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[bool]:
-    """Return whether its software would be updated, after which the boot-up begins again."""
+    """Return whether the node's software would be updated, after which the boot-up restarts."""
     at, name, wanted = boot_slave.IDENTIFICATION, "software identification", slave.software_version
     data = yield from talk.read(at, 1, name, BootStatus.NO_PROGRAM_OBJECTS)
     what = f"{at:04X}h:01 {name}"
@@ -687,7 +699,7 @@ def _explain_software(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Scri
 
 
 def _explain_writes(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[None]:
-    """Show the writes of the configuration, each beside the value that the node has."""
+    """Show the writes of the configuration, each with the present value of the node."""
     if slave.restore_sub:
         talk.record(f"1011h:{slave.restore_sub:02X} := load", _NOT_SENT, "would be written")
         kind = "communication" if slave.restore_sub == _COMMUNICATION else "node"

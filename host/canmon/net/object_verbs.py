@@ -1,4 +1,4 @@
-"""The verbs of `canmon net` about objects: read, write, compare, store, restore, dcf."""
+"""The verbs of `canmon net` about objects: read, write, compare, store, restore and dcf."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _wanted(objects: NamedObjects, names: Sequence[str]) -> list[Entry]:
 
 
 def _read(session: NetSession, objects: NamedObjects, entry: Entry, as_json: bool) -> str | None:
-    """Return a line with the value; None if the node refuses, which is reported."""
+    """Return a line with the value, or None if the node refuses. The refusal is reported."""
     node_id = objects.node_id
     try:
         data = session.bus.read(node_id, *entry, objects.size(entry))
@@ -180,7 +180,7 @@ def _write_one(session: NetSession, objects: NamedObjects, entry: Entry, data: b
 
 
 def _hint(entry: Entry) -> str:
-    """Return a hint for changing the mapping of a PDO; empty for other objects."""
+    """Return a hint for changing the mapping of a PDO, empty for other objects."""
     if entry[0] not in _PDO_MAPPINGS:
         return ""
     return f"; disable the PDO first: {entry[0] - _MAPPING_OFFSET:04X}h:01 with bit 31"
@@ -230,7 +230,7 @@ def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) 
 
 
 def _other_id(word: str) -> int:
-    """Return the node-ID of a word, 0 if it is not one."""
+    """Return the node-ID that a word contains, or 0 if it is not a node-ID."""
     number = int(word) if word.isascii() and word.isdecimal() else 0
     if number > 127:
         raise Refused(f"{word} is no node-ID 1..127")
@@ -256,7 +256,7 @@ def _of_file(objects: node_objects.NamedObjects) -> Values:
 
 
 def _values_of(session: NetSession, node_id: int, entries: Collection[Entry]) -> Values:
-    """Read objects of a node; omit those that it refuses."""
+    """Read objects of a node. Omit objects that the node refuses."""
     found: Values = {}
     for entry in sorted(entries):
         try:
@@ -267,7 +267,7 @@ def _values_of(session: NetSession, node_id: int, entries: Collection[Entry]) ->
 
 
 def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
-    """Return the parameters of another node, converted to the node-ID of this one."""
+    """Return the parameters of another node, converted to the node-ID of this node."""
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:
         raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
@@ -289,23 +289,23 @@ def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: 
 _STORE: Final = 0x1010
 _RESTORE: Final = 0x1011
 _PATIENCE_US: Final = 10_000_000
-"""A node that writes its memory may answer late."""
+"""Longest time until a node that writes its memory answers."""
 _BOOT_UP_US: Final = 5_000_000
 _ON_COMMAND: Final = 1
-"""Bit 0 of 1010h: it saves on command."""
+"""Bit 0 of 1010h, which is set if the node saves on command."""
 
 _AREAS: Final = {"all": 1, "communication": 2, "application": 3}
 _COMMUNICATION: Final = 2
 
 
 def save(session: NetSession, node_id: int, sub: int) -> None:
-    """Make a node store parameters; NodeFailed if it cannot.
+    """Make a node store parameters. Raise NodeFailed if it cannot store them.
 
     Args:
-        session: the bus.
-        node_id: the node.
-        sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others are
-            manufacturer-specific.
+        session: session with the open bus.
+        node_id: node-ID of the node.
+        sub: sub-index of 1010h: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh. Further
+            sub-indices are manufacturer-specific.
     """
     _check_saves(session, node_id, sub)
     with of_node(node_id):
@@ -314,7 +314,7 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
 
 
 def _check_saves(session: NetSession, node_id: int, sub: int) -> None:
-    """Read whether a node stores on command; NodeFailed if not."""
+    """Check that a node stores on command. Raise NodeFailed if it does not."""
     with of_node(node_id):
         data = session.bus.read(node_id, _STORE, sub)
         if not data[:1] or not data[0] & _ON_COMMAND:
@@ -329,14 +329,14 @@ def _save_text(sub: int) -> str:
 
 
 def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
-    """Make a node erase stored parameters, effective from its next reset."""
+    """Make a node erase stored parameters. This takes effect at its next reset."""
     with of_node(node_id):
         session.bus.write(node_id, _RESTORE, sub, b"load", _PATIENCE_US)
     say(f"node {node_id}: restored; the defaults count from its next reset")
 
 
 def reset(session: NetSession, node_id: int, sub: int) -> None:
-    """Reset a node, or only its restored communication; wait for its boot-up."""
+    """Reset a node, or only its restored communication. Wait for its boot-up."""
     communication = sub == _COMMUNICATION
     command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
     session.bus.command(command, node_id)
@@ -499,7 +499,7 @@ def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Va
 def _steps(
     session: NetSession, objects: node_objects.NamedObjects, changed: Values, file: Path
 ) -> list[Write]:
-    """Return the writes; Refused if the file has impossible ones."""
+    """Return the writes. Raise Refused if the file has impossible writes."""
     writable = {at for at, row in objects.rows.items() if row.writable}
 
     def number(at: node_objects.Entry) -> int:

@@ -1,4 +1,4 @@
-"""The verb `net program`: download firmware to a node."""
+"""The verb `net program`, which downloads firmware to a node."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _S_US = 1_000_000
 
 
 class ProgressBar:
-    """Progress of a transfer: bytes, total and rate.
+    """Progress display of a transfer with bytes, total and rate.
 
     Args:
-        total: bytes in all.
-        now_us: tells the time of the bus.
+        total: total number of bytes.
+        now_us: function that returns the time of the bus.
     """
 
     def __init__(self, total: int, now_us: Callable[[], int]) -> None:
@@ -52,7 +52,7 @@ class ProgressBar:
         self._text = ""
 
     def take(self, done: int) -> None:
-        """Show how many bytes are done."""
+        """Show the number of transferred bytes."""
         if not done:
             self._begun_us = self._now_us()
         text = self._line(done)
@@ -187,7 +187,7 @@ def _title(entry: Entry) -> str:
 
 
 def _read(file: Path) -> bytes:
-    """Read the firmware; Refused if it cannot be, is empty or too large."""
+    """Read the firmware. Raise Refused if it is unreadable, empty or too large."""
     with refusing("FILE"), file.open("rb") as opened:
         data = opened.read(_MOST_BYTES + 1)
     if not data:
@@ -213,7 +213,7 @@ def _download(  # noqa: PLR0913 - steps
     tries: int,
     start: bool,
 ) -> None:
-    """Run each step, with the message for an end after it."""
+    """Run each step. If a step ends the program, print the message for this step."""
     work = session.work
     work.plan("stop", "clear", "download", "identification", *(["start"] if start else []))
     program.stop()

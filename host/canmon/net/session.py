@@ -1,4 +1,4 @@
-"""One call of a verb of `canmon net`: its bus, its question to the user, and its end."""
+"""One call of a verb of `canmon net`, with its bus, its question to the user, and its end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 
 _Title = Callable[[tuple[int, int]], str]
-"""Writes index, sub-index and name of an object."""
+"""Function that returns index, sub-index and name of an object as text."""
 
 _MOST_LISTED: Final = 5
 
@@ -34,7 +34,10 @@ _LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
 
 
 class NodeFailed(click.ClickException):
-    """A node refused, or did not answer: one line on standard error, and exit status 1."""
+    """A node refused, or did not answer.
+
+    The error ends the verb with one line on standard error, and exit status 1.
+    """
 
     exit_code = 1
 
@@ -46,7 +49,8 @@ class _Work:
     """The planned steps, so that the message of an early end can list the finished ones.
 
     Attributes:
-        ending: final state of the nodes, reported in any case; empty if there is nothing to report.
+        ending: final state of the nodes, which is reported in any case. It is empty if there is
+            nothing to report.
     """
 
     def __init__(self) -> None:
@@ -55,7 +59,7 @@ class _Work:
         self._done = 0
 
     def plan(self, *steps: str) -> None:
-        """Add steps, in order."""
+        """Add steps in order."""
         self._steps += steps
 
     def done(self) -> None:
@@ -63,7 +67,7 @@ class _Work:
         self._done += 1
 
     def progress(self) -> str:
-        """Return the finished and the open steps; empty if none were planned."""
+        """Return the finished and the open steps, empty if no steps were planned."""
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
         said = [f"{word}: {_listed(items)}" for word, items in parts if items]
@@ -71,22 +75,22 @@ class _Work:
 
 
 def _listed(steps: list[str]) -> str:
-    """List a few steps, or the first and the last one of many."""
+    """List a few steps, or the first and the last of many steps."""
     if len(steps) <= _MOST_LISTED:
         return ", ".join(steps)
     return f"{steps[0]}, ... {steps[-1]} ({len(steps)} in all)"
 
 
 class NetSession:
-    """An open bus.
+    """The session of a verb with an open bus.
 
     Args:
-        source: the bus, and the known nodes.
-        timeout_us: time-out for an answer.
+        source: bus with the known nodes.
+        timeout_us: time to wait for an answer.
 
     Attributes:
-        bus: communicates with its nodes.
-        work: the planned steps.
+        bus: bus that communicates with the nodes.
+        work: planned steps of the verb.
     """
 
     def __init__(self, source: ConformSource, timeout_us: int) -> None:
@@ -94,12 +98,12 @@ class NetSession:
         self.bus, self.work = NodeBus(source.link, timeout_us), _Work()
 
     def confirm(self, what: str, *, yes: bool, risk: str = "") -> None:
-        """Ask before a change; not for a rig in virtual time.
+        """Ask the user before a change, except for a rig in virtual time.
 
         Args:
-            what: the change.
-            yes: `--yes`: do not ask.
-            risk: physical risk, as a sentence; empty for none.
+            what: description of the change.
+            yes: whether `--yes` was given, which skips the question.
+            risk: physical risk as a sentence, empty for none.
 
         Raises:
             Refused: the answer is no, or there is no terminal to ask.
@@ -117,7 +121,7 @@ class NetSession:
 
 
 def print_plan(*steps: str) -> None:
-    """Print the steps of `--dry-run`, one a line, and that none was made."""
+    """Print the steps of `--dry-run`, one per line, and that no step was executed."""
     for step in steps:
         click.echo(one_line(f"not done: {step}"))
     say("dry run: nothing was written")
@@ -125,17 +129,18 @@ def print_plan(*steps: str) -> None:
 
 @contextmanager
 def net_session(call: NetCall, node_id: int | None = None) -> Iterator[NetSession]:
-    """Open the bus, and close it at the end; an error ends the verb with one line.
+    """Open the bus, and close it at the end. An error ends the verb with one line.
 
     Args:
-        call: options of the bus.
-        node_id: of the node, which selects the bus of a rig with several; None for the first.
+        call: call with the options of the bus.
+        node_id: node-ID of the node, which selects the bus of a rig with several buses. None
+            selects the first bus.
 
     Raises:
-        Refused: it is not a bus with nodes.
+        Refused: the source is not a bus with nodes.
         NodeFailed: a node refused or did not answer.
         SourceFailed: the bus failed.
-        Exit: it was interrupted.
+        Exit: the user interrupted the verb.
     """
     source = open_conform_source(call.word, node_id, call.bus)
     session, ended = NetSession(source, call.timeout_us), False

@@ -1,4 +1,4 @@
-"""Files that curves are written to: SVG and HTML, PNG through matplotlib (extra `plot`), CSV."""
+"""Files with curves: SVG and HTML, PNG through matplotlib (extra `plot`), and CSV."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from tickrig.host.text.whole_file import replacing, write_whole
 
 
 def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
-    """Write the samples in a view: a row for each time, a column for each series.
+    """Write the samples in a view, with a row for each time and a column for each series.
 
-    A cell is empty if a series has no sample at that time. If it has several, the last one counts.
-    Times are seconds with six digits, as in the log.
+    A cell is empty if a series has no sample at that time. If a series has several samples at that
+    time, the last sample counts. Times are seconds with six digits, as in the log.
     """
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(["t_s", *(_heading(one) for one in series)])
@@ -48,7 +48,7 @@ def _heading(series: Series) -> str:
 
 
 def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int, int, float]]:
-    """Yield time, which series, which sample, value; in this order they are sorted."""
+    """Yield time, number of the series, number of the sample, and value. This is the sort order."""
     seen = series.between(view.from_us, view.to_us)
     for index in range(seen.start, seen.stop):
         yield series.at_us[index], number, index, series.values[index]
@@ -56,13 +56,13 @@ def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int
 
 _DPI: Final = 100
 _AXIS_SHARE: Final = 0.09
-"""Of the width, for each axis beyond the second."""
+"""Share of the width for each axis beyond the second one."""
 _LEAST_HEIGHT, _BAND_HEIGHT = 250, 45
-"""Pixels of a picture with states, and of each row of them."""
+"""Least height in pixels of a picture with states, and height of each row of states."""
 _LETTER: Final = 8
-"""Pixels of a letter."""
+"""Width of a letter in pixels."""
 _MARGIN: Final = 0.03
-"""Of an axis, above and below its curves."""
+"""Share of an axis that is left free above and below its curves."""
 
 
 def write_png(  # noqa: PLR0913, PLR0917 - what is drawn, and how
@@ -151,7 +151,7 @@ _KINDS: Final = (".svg", ".html", ".png", ".csv")
 
 
 def check_graph_path(path: Path) -> None:
-    """Refuse a file whose name tells no kind."""
+    """Raise Refused if the name of a file indicates no known kind."""
     if path.suffix.lower() not in _KINDS:
         raise Refused(f"-o {path}: a graph is written as {', '.join(_KINDS)}")
 
@@ -159,17 +159,17 @@ def check_graph_path(path: Path) -> None:
 def write_graph(
     path: Path, series: Sequence[Series], view: View, size: tuple[int, int], title: str = ""
 ) -> None:
-    """Write curves in the format given by the file's name.
+    """Write curves in the format that the name of the file indicates.
 
     Args:
-        path: the file; its suffix is one of `_KINDS`.
-        series: the curves.
-        view: the visible part.
+        path: path of the file. Its suffix is one of `_KINDS`.
+        series: samples of the curves.
+        view: visible part of the curves.
         size: width and height of a picture in pixels.
         title: title of a picture.
 
     Raises:
-        Refused: for PNG: matplotlib is not installed.
+        Refused: matplotlib, which PNG needs, is not installed.
         SourceFailed: the file cannot be written.
     """
     try:

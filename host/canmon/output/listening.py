@@ -1,4 +1,4 @@
-"""Taking what comes from a source, with or without a screen, and how that ends."""
+"""Reading from a source, with or without a screen, and how reading ends."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ else:  # numpy
 
 
 ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
-"""Alternate screen, no cursor, no wrapping, all clear."""
+"""Codes for the alternate screen, without cursor and line wrapping, and for clearing it."""
 
 LEAVE: Final = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
 _CLEAR: Final = "\x1b[2J"
 
 _ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
-"""Keys that are more than a character, and what is pressed instead."""
+"""Keys that send several characters, and the keys that they stand for."""
 
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
 _COLOUR: Final = re.compile(r"(\x1b\[(?:[07]|3[1-6])m)")
@@ -61,7 +61,7 @@ class _Screen:
     """The controlling terminal, even if standard input is a pipe.
 
     The terminal is restored at the end, also after errors. A stuck terminal does not block the
-    program: no new picture is written until the terminal has accepted the last one.
+    program. No new picture is written until the terminal has accepted the last picture.
 
     Raises:
         OSError: there is no terminal.
@@ -74,7 +74,7 @@ class _Screen:
         self._size = (0, 0)
 
     def __enter__(self) -> Self:
-        """Take the terminal."""
+        """Switch the terminal to the screen."""
         self._give_back = take_keys(self._terminal)
         self._output.write(ENTER)
         return self
@@ -85,7 +85,7 @@ class _Screen:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give it back."""
+        """Restore the terminal."""
         self._output.write(LEAVE, last=True)
         if not self._output.close():
             give_up_terminals()
@@ -98,13 +98,13 @@ class _Screen:
         return self._output.gone
 
     def size(self) -> tuple[int, int]:
-        """Return its columns and lines; 80 x 24 if it is gone."""
+        """Return the columns and lines of the terminal, or 80 x 24 if the terminal is gone."""
         with suppress(OSError):
             return os.get_terminal_size(self._terminal)
         return (80, 24)
 
     def keys(self) -> list[str]:
-        """Return the keys that were pressed; none if it is gone."""
+        """Return the pressed keys, or none if the terminal is gone."""
         text = ""
         with suppress(OSError):
             if ready([self._terminal], wait_s=0)[0]:
@@ -114,7 +114,7 @@ class _Screen:
     def paint(self, lines: Sequence[str]) -> None:
         """Show lines, if the terminal has accepted the previous ones.
 
-        The only control codes in the lines that have an effect are those of colours.
+        Control codes in the lines have no effect, except those of colours.
         """
         if not self._output.catches_up(_PATIENCE_S):
             return
@@ -126,7 +126,7 @@ class _Screen:
 
 
 def _painted(line: str) -> str:
-    r"""Return a line with nothing for the terminal but our colours.
+    r"""Return a line without control codes, except the colours of this program.
 
     >>> _painted("\x1b[7m01\x1b[0m \x1b]52;c;\a")
     '\x1b[7m01\x1b[0m ␛]52;c;␇'
@@ -136,7 +136,7 @@ def _painted(line: str) -> str:
 
 
 def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
-    r"""Return what to write so that lines are shown where others are.
+    r"""Return the text that changes the displayed lines to new lines.
 
     >>> _difference(["a", "b", "c"], ["a", "x"])
     '\x1b[2;1Hx\x1b[K\x1b[3;1H\x1b[K'
@@ -153,9 +153,9 @@ def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Continues the time of the latest frame by the clock of this machine.
+    """Clock that continues the time of the latest frame by the clock of this machine.
 
-    The clock of a driver's time stamps may differ from that of this machine. Therefore only
+    The clock of a driver's time stamps may differ from the clock of this machine. Therefore only
     differences of stamps count.
 
     Attributes:
@@ -166,7 +166,7 @@ class Stopwatch:
         self.latest_us, self._since_us = 0, _now_us()
 
     def take(self, records: Sequence[Record | LineRecord]) -> None:
-        """Go on from the last of these frames."""
+        """Continue from the last of these frames."""
         if records:
             self.latest_us, self._since_us = records[-1].at_us, _now_us()
 
@@ -185,9 +185,9 @@ _SLACK_NS: Final = 1_000
 
 
 class Pace:
-    """A clock: microseconds since its creation.
+    """Clock that counts microseconds since its creation.
 
-    It sleeps until absolute times, so that actions timed by it do not drift.
+    The clock sleeps until absolute times, so that the actions that it times do not drift.
     """
 
     def __init__(self) -> None:
@@ -196,11 +196,11 @@ class Pace:
 
     @property
     def now_us(self) -> int:
-        """The time."""
+        """Current time of the clock."""
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, at_us: int) -> int:
-        """Return when it is `at_us`; the answer is how late, in microseconds."""
+        """Wait until the time is `at_us`. Return the delay in microseconds."""
         early_us = at_us - self.now_us
         if early_us > 0:
             time.sleep(early_us / 1e6)
@@ -208,7 +208,10 @@ class Pace:
 
 
 def _wake_on_time() -> None:
-    """Ask Linux not to let this thread sleep up to 50 us longer (prctl(2), PR_SET_TIMERSLACK)."""
+    """Ask Linux not to extend sleeps of this thread by up to 50 us.
+
+    The system call is prctl(2) with PR_SET_TIMERSLACK.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, _SLACK_NS, 0, 0, 0)
 
@@ -218,7 +221,10 @@ _Result = TypeVar("_Result")
 
 
 class _FramesLost(click.ClickException):
-    """One line on standard error, and exit status 4."""
+    """Frames were lost.
+
+    The error prints one line on standard error, with exit status 4.
+    """
 
     exit_code = 4
 
@@ -227,7 +233,7 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
     """Report lost frames, invalid frames and other notes, then close the source.
 
     Raises:
-        SourceFailed: it ended early.
+        SourceFailed: the source ended early.
         _FramesLost: frames were lost or could not be read, and the caller is strict.
     """
     source.close()
@@ -243,14 +249,17 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 
 
 def expect_frames(source: AnySource[object], meaning: FilteredDecoder | None = None) -> None:
-    """End with status 1 where filters or a cut left out all frames of a log; `report` says it."""
+    """Exit with status 1 if filters or a cut removed all frames of a log.
+
+    `report` prints the message.
+    """
     nothing = source.nothing_passed or (meaning is not None and meaning.nothing_passed)
     if nothing and (source.recorded or not source.live):
         raise click.exceptions.Exit(_NOT_COME)
 
 
 class _Interruptions(Interrupter):
-    """Ctrl-C and the signals that end a program: they end the present work, at once or after it.
+    """Ctrl-C and other signals that end a program, either at once or after the present work.
 
     Attributes:
         came: whether a signal has arrived.
@@ -261,7 +270,7 @@ class _Interruptions(Interrupter):
         self._held = self.came = False
 
     def received(self, number: int, frame: FrameType | None) -> None:
-        """Take a signal."""
+        """Process a signal."""
         self.came = True
         if self._held:
             give_up_terminals()
@@ -269,7 +278,10 @@ class _Interruptions(Interrupter):
             super().received(number, frame)
 
     def behind(self, act: Callable[Given, _Result]) -> Callable[Given, _Result]:
-        """Return what does the same, and is not cut short: an interruption ends it behind that."""
+        """Return a function that is not interrupted.
+
+        An interruption takes effect after the function.
+        """
 
         def whole(*arguments: Given.args, **named: Given.kwargs) -> _Result:
             self._held = True
@@ -286,7 +298,7 @@ class _Interruptions(Interrupter):
 
 @contextmanager
 def until_interrupted() -> Iterator[_Interruptions]:
-    """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
+    """End the block at Ctrl-C and at signals that end a program. Continue after the block."""
     interruptions = _Interruptions()
     with suppress(KeyboardInterrupt), taking_signals(interruptions.received):
         yield interruptions
@@ -297,24 +309,24 @@ _Item = TypeVar("_Item", bound="AnyRecord")
 _POLL_US: Final = 20_000
 _NOT_COME: Final = 1
 _PATIENCE_US: Final = 5_000_000
-"""How long to listen to a bus if nothing else ends it."""
+"""Time to listen to a bus if nothing else ends listening."""
 
 
 span_option: Final = time_option(
     "--for", "span_us", help="End after 10s, 500ms; in a log by its times."
 )
-"""Add the option `--for`, in microseconds."""
+"""Decorator that adds the option `--for`, in microseconds."""
 
 
 def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
-    """Return the bit rate that -b or a SOURCE word names, as can0@500k; None if none does."""
+    """Return the bit rate in -b or in a SOURCE word, such as can0@500k, or None without one."""
     buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
     named = (word.bitrate for word in buses if word.bitrate is not None)
     return next(named, None) if options.bitrate is None else options.bitrate
 
 
 def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
-    """Return both bit rates that the options or a SOURCE word name, as can0@500k/2M."""
+    """Return both bit rates in the options or in a SOURCE word, such as can0@500k/2M."""
     buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
     named = (word.data_bitrate for word in buses if word.data_bitrate is not None)
     fast = next(named, None) if options.data_bitrate is None else options.data_bitrate
@@ -334,11 +346,11 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
 
     Args:
         source: source of the frames.
-        words: its SOURCE words.
-        take: called with the records.
-        span_us: duration; None if not given.
-        lines: status lines of a live source, shown if there is a terminal.
-        press: called with keys pressed on the terminal.
+        words: SOURCE words that name the source.
+        take: function that is called with the records.
+        span_us: duration, or None if no duration is given.
+        lines: function that returns status lines of a live source, shown if there is a terminal.
+        press: function that is called with keys pressed on the terminal.
     """
     with until_interrupted():
         if lines is not None and source.live and sys.stdout.isatty():
@@ -350,7 +362,7 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
 def listen(
     source: AnySource[_Item], take: Callable[[Sequence[_Item]], None], span_us: int | None
 ) -> None:
-    """Take what comes until the source ends or the time is over: in a log by its own times."""
+    """Read until the source ends or the time is over. A log is timed by its own times."""
     begin_s, last_us = time.monotonic(), None
     while not (source.ended or (source.live and _is_over(begin_s, span_us))):
         records = source.poll(_POLL_US)
@@ -366,7 +378,7 @@ def listen(
 
 
 def say_marks(source: AnySource[object]) -> None:
-    """Report on standard error which bus went away, or is back."""
+    """Report on standard error which buses went away or are back."""
     for mark in () if source.recorded else source.marks:
         click.echo(mark.text, err=True)
 
@@ -375,12 +387,12 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
     """Read all blocks of a log, or until the user interrupts.
 
     Args:
-        log: the log.
-        take: called with each block.
-        span_us: duration by the times of the log; None for the whole log.
+        log: log that is read in blocks.
+        take: function that is called with each block.
+        span_us: duration by the times of the log, or None for the whole log.
 
     Returns:
-        False if the log contains CAN FD frames; the whole log must then be read frame by frame.
+        False if the log contains CAN FD frames. The whole log must then be read frame by frame.
     """
     last_us: int | None = None
     with until_interrupted():
@@ -398,7 +410,7 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
 
 
 def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot | None:
-    """Return the statistics of a log; None where it is to be read frame by frame."""
+    """Return the statistics of a log, or None if the log must be read frame by frame."""
     if log is None:
         return None
     traffic = column_traffic.ColumnTraffic()
@@ -406,7 +418,7 @@ def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot |
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
-    """Return how long to listen if no time is given; a file and a pipe have an end."""
+    """Return the time to listen if no time is given. Files and pipes have an end."""
     return None if not source.live or list(words) == ["-"] else _PATIENCE_US
 
 
@@ -419,7 +431,7 @@ _PAINT_S: Final = 0.1
 _QUIT: Final = "q"
 
 _Lines = Callable[[int, int, int], list[str]]
-"""Returns the lines to show at a time, for a screen of this size."""
+"""Function that returns the lines to show at a time, for a screen of a given size."""
 
 
 def _paint(
@@ -433,10 +445,10 @@ def _paint(
 
     Args:
         source: live source of the frames.
-        take: called with the records.
-        lines: returns the lines to show.
-        span_us: duration; None for no end.
-        press: called with other keys; the display is updated at once.
+        take: function that is called with the records.
+        lines: function that returns the lines to show.
+        span_us: duration, or None for no end.
+        press: function that is called with other keys. The display is updated at once.
     """
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with _Screen() as screen:

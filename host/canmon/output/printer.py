@@ -1,4 +1,4 @@
-"""What frames mean, which of them are wanted, and what `dump` prints of each."""
+"""The meaning of frames, the filter for wanted frames, and the output of `dump` for each frame."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 
 
 class FilteredDecoder:
-    """Decodes frames and passes on the wanted ones.
+    """Decoder that passes on the wanted frames.
 
     Args:
-        decoder: decodes frames; None for no decoding.
-        wanted: which frames pass; None for all. It needs a decoder.
+        decoder: decoder of frames, or None for no decoding.
+        wanted: filter that frames must pass, or None for all frames. A filter needs a decoder.
 
     Attributes:
         taken: number of frames.
@@ -62,13 +62,16 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return the same cut; the decoder learns from the frames in front of it."""
+        """Return the same cut, whose earlier frames the decoder learns from."""
         if self._decoder is None or cut.begin is None:
             return cut
         return replace(cut, earlier=self._decoder.take)
 
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
-        """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
+        """Return the wanted frames.
+
+        All frames are decoded, because the decoder learns from each frame.
+        """
         decoder, wanted, missing = self._decoder, self._wanted, self._missing
         self.taken += len(records)
         for record in records:
@@ -84,13 +87,13 @@ class FilteredDecoder:
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether frames came, and the filter let none pass."""
+        """Whether there were frames, but no frame passed the filter."""
         return self._wanted is not None and self.taken > 0 and not self.passed
 
     def messages(self) -> list[str]:
-        """Return the signals and kinds in the filter that never came, one line each.
+        """Return the signals and kinds in the filter that never occurred, with one line each.
 
-        If all of them came, the line reports that no frame passed.
+        If all signals and kinds occurred, the line reports that no frame passed.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
@@ -102,11 +105,11 @@ class FilteredDecoder:
 # What `dump` prints of each frame: candump's lines, its log format, JSON or CSV.
 
 _Printer = Callable[["AnyRecord", "Decoded | None"], str]
-"""Writes a frame, or a line of a serial port, and what it means, where that is known."""
+"""Function that prints a frame, or a line of a serial port, with its meaning if it is known."""
 
 
 class DumpFormat(StrEnum):
-    """What is printed."""
+    """Output format of frames."""
 
     TEXT = ""
     LOG = "log"
@@ -119,9 +122,9 @@ def printer_of(output: DumpFormat, lines: DumpLines, raw: bool, errors: bool = F
 
     Args:
         output: format of the output.
-        lines: writes lines of text.
+        lines: writer of text lines.
         raw: whether to omit the meaning of frames.
-        errors: whether to keep the meaning of error frames if `raw`.
+        errors: whether to keep the meaning of error frames if `raw` is set.
     """
     write = _writer(output, lines)
     if not raw:
@@ -152,7 +155,7 @@ def _error_meaning(record: AnyRecord) -> Decoded | None:
 
 
 def _text_printer(lines: DumpLines) -> _Printer:
-    """Return what writes lines as candump shows them."""
+    """Return a function that writes lines as candump shows them."""
 
     def printed(record: AnyRecord, decoded: Decoded | None) -> str:
         text = one_line(decoded_text(decoded))
@@ -164,13 +167,13 @@ def _text_printer(lines: DumpLines) -> _Printer:
 
 
 def _log_printer(record: AnyRecord, decoded: Decoded | None) -> str:
-    """Write a line of a log, which holds frames alone."""
+    """Write a line of a log, which holds only frames."""
     assert isinstance(record, Record), "who opens serial ports does not ask for a log"
     return log_line(record)
 
 
 def _json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
-    """Write an object in JSON, with kind, node, text, signals and their source."""
+    """Write a JSON object with kind, node, text, signals and their source."""
     more = "" if decoded is None else _meaning_json(decoded)
     if isinstance(record, Record):
         return json_line(record, more)
@@ -188,7 +191,7 @@ def _meaning_json(decoded: Decoded) -> str:
 
 
 def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
-    """Write a row below `DUMP_HEADER`; a line of a serial port has no identifier."""
+    """Write a row below `DUMP_HEADER`. A line of a serial port has no identifier."""
     at_us, channel, sent = record.at_us, record.channel, record.sent
     if isinstance(record, Record):
         frame = record.frame
@@ -206,25 +209,26 @@ def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return a value for JSON: bytes are hex, and a NaN or infinity is null."""
+    """Return a value for JSON. Bytes become hex, and a NaN or infinity becomes null."""
     if isinstance(value, float) and not isfinite(value):
         return None
     return value.hex().upper() if isinstance(value, bytes | bytearray) else value
 
 
 def _cell(text: str) -> str:
-    """Quote a cell that needs it (RFC 4180)."""
+    """Quote a cell that needs quotes (RFC 4180)."""
     quoted = text.replace('"', '""')
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
 class BlockPrinter:
-    """Writes the lines of many frames at once, with the same result as `printer_of`.
+    """Writer for the lines of many frames at once, with the same result as `printer_of`.
 
     Args:
-        output: format: text, or a log.
-        lines: writes single lines of text; each of the two continues where the other ended.
-        decoder: decodes frames; other code may feed it between two calls. None for no decoding.
+        output: format of the output, which is text or a log.
+        lines: writer of single text lines. It and this object continue where the other one ended.
+        decoder: decoder of frames, or None for no decoding. Other code may feed the decoder between
+            two calls.
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
@@ -233,7 +237,10 @@ class BlockPrinter:
             self._decode = column_meanings.ColumnMeanings(decoder).texts
 
     def texts(self, columns: Columns) -> Iterator[str]:
-        """Write frames that fit, each line with its end; a terminal obeys nothing in them."""
+        """Write frames that fit, each line with its end.
+
+        Control codes in the lines have no effect.
+        """
         if self._output is DumpFormat.LOG:
             return iter([column_text.log_lines(columns)])
         return self._screen.texts(columns, self._decode and self._decode(columns))
@@ -247,10 +254,10 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 
 
 class StdoutWriter:
-    """Lines on standard output; in JSON and in a log, events between frames are lines, too.
+    """Lines on standard output. In JSON and in a log, events between frames are also lines.
 
-    A log and CSV are written with unchanged characters, so that they can be read again exactly.
-    This does not apply to a terminal.
+    A log and CSV are written with unchanged characters, so that other programs can read them again
+    exactly. This does not apply to a terminal.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:
@@ -265,7 +272,7 @@ class StdoutWriter:
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
-        """Print frames, at once; it always takes more."""
+        """Print frames at once. The writer never ends the reading."""
         lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and (said := _DROPS.get(self._output)):
@@ -280,7 +287,7 @@ class StdoutWriter:
         return False
 
     def take_block(self, texts: Iterable[str], lost: int) -> None:
-        """Print the lines of a block, as `BlockPrinter.texts` has them."""
+        """Print the lines of a block as `BlockPrinter.texts` returns them."""
         stream = self._stream()
         for text in texts:
             write_harmless(stream, text)

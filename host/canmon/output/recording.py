@@ -1,4 +1,4 @@
-"""A log file, or a recording in parts, that a verb writes, and its options."""
+"""A log file, or a recording in parts, that a verb writes, with its options."""
 
 from __future__ import annotations
 
@@ -53,17 +53,17 @@ class LogFile:
     """A running recording.
 
     Args:
-        plan: its settings; a single file replaces an existing one.
-        source: SOURCE words of the source.
+        plan: settings of the recording. A single file replaces an existing file.
+        source: SOURCE words of the recorded source.
         live: whether time also passes without frames.
-        triggers: what it waits for, if the plan has a trigger.
-        wanted: which frames are recorded; None for all.
+        triggers: triggers that start the recording, if the plan has a trigger.
+        wanted: filter for the recorded frames, or None for all frames.
         kept: whether to keep the file if writing fails.
 
     Raises:
         Refused: the name has no known format, the format needs a missing package, or the file is
             being read.
-        SourceFailed: it cannot be written, now or later.
+        SourceFailed: the file cannot be written, now or later.
     """
 
     def __init__(  # noqa: PLR0913 - what a recording can be
@@ -90,10 +90,10 @@ class LogFile:
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
-        """Add frames; what came is with the operating system then.
+        """Add frames, and pass them to the operating system.
 
         Returns:
-            Whether it takes no more.
+            Whether the recording has ended.
         """
         if decoded_frames:
             self._watch.take((decoded_frames[-1][0],))
@@ -103,7 +103,7 @@ class LogFile:
         return bool(self.recorder.ended)
 
     def take_block(self, block: TextBlock) -> bool:
-        """Add many frames at once, one at least; False where `take` is to add them."""
+        """Add many frames at once. Return False if `take` must add them."""
         self._watch.latest_us = block.last_us
         taken = self.recorder.take_block(block, self._now_us)
         if self.recorder.failed:
@@ -111,11 +111,11 @@ class LogFile:
         return taken
 
     def trigger(self, why: str) -> None:
-        """Record what was kept and what comes, where it waits for that."""
+        """Record the kept and the following frames, if the recording waits for a trigger."""
         self.recorder.trigger(why, self._now_us)
 
     def close(self) -> None:
-        """End the recording, and say how it went."""
+        """End the recording and report the result."""
         failed = self.recorder.failed
         self.recorder.close()
         for word in self.recorder.messages() if self._kept or not self.recorder.failed else ():
@@ -125,7 +125,7 @@ class LogFile:
 
     @property
     def _now_us(self) -> int:
-        """The time at the source: that of this machine until a frame has a time."""
+        """The time at the source, which is the time of this machine until a frame has a time."""
         if not self._live:
             return self._watch.latest_us
         return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
@@ -133,14 +133,14 @@ class LogFile:
 
 @contextmanager
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
-    """Open a log for writing: a new file, which replaces `path` at the end.
+    """Open a log for writing. The log is a new file that replaces `path` at the end.
 
     If the source is not a file, writing may take long, and other programs may read the log during
-    that time. In this case the log is written to `path` directly.
+    that time. In this case, the log is written to `path` directly.
 
     Raises:
-        Refused: its name has no known format, or it is being read.
-        SourceFailed: it cannot be written.
+        Refused: the name of the file has no known format, or the file is being read.
+        SourceFailed: the file cannot be written.
     """
     _check_not_read(path, source)
     with refusing("", LogFormatError):
@@ -159,14 +159,16 @@ def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
 
 
 def _check_not_read(path: Path, source: Sequence[str]) -> None:
-    """Refuse a file that is being read."""
+    """Raise Refused for a file that is being read."""
     read = (parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec))
     if path.exists() and any(one.exists() and one.samefile(path) for one in read):
         raise Refused(f"{path} is read, so it cannot be written")
 
 
 def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
-    """Write frames into a new log; report their number, and what the format cannot hold.
+    """Write frames into a new log.
+
+    Report the number of frames, and items that the format cannot hold.
 
     Raises:
         ValueError: the file exists already, or cannot be written.
@@ -211,7 +213,7 @@ recording_options: Final[Decorator] = add_options(
     click.option("--pre", metavar="N|TIME", help="Frames, or time, before a trigger.  [5s]"),
     click.option("--post", metavar="N|TIME", help="And behind it.  [5s]"),
 )
-"""Add what `RecordingOptions` takes."""
+"""Decorator that adds the options of `RecordingOptions`."""
 
 WORDS_METAVAR: Final = "FILE [--rotate 100M] [--disk 2G] [--trigger emcy]"
 
@@ -223,13 +225,13 @@ class RecordingOptions:
 
     Args:
         path: path of the file.
-        options: the options, by name.
-        bit_rate: bit rate of the bus, for a rule that limits the load.
+        options: options by name.
+        bit_rate: bit rate of the bus, used for a rule that limits the load.
         parts: whether to record in parts, regardless of the options.
 
     Attributes:
         plan: settings of the recording.
-        triggers: what the recording waits for.
+        triggers: triggers that start the recording.
         decodes: whether a trigger needs decoded frames.
 
     Raises:
@@ -250,17 +252,17 @@ class RecordingOptions:
         Args:
             source: SOURCE words of the recorded source.
             live: whether time passes without frames.
-            wanted: which frames are recorded; None for all.
+            wanted: filter for the recorded frames, or None for all frames.
 
         Raises:
             Refused: the format cannot be written here, or the file is being read.
-            SourceFailed: it cannot be written.
+            SourceFailed: the file cannot be written.
         """
         return LogFile(self.plan, source, live, self.triggers, wanted)
 
 
 def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
-    """Parse the arguments of a recording in parts: a file and options; Refused if invalid."""
+    """Parse a file and options of a recording in parts. Raise Refused if they are invalid."""
     try:
         command = click.Command("record", params=_params())
         context = command.make_context("record", shlex.split(words))
@@ -276,13 +278,13 @@ def _params() -> list[click.Parameter]:
     @click.argument("file", type=PATH)
     @recording_options
     def record() -> None:
-        """Hold the options."""
+        """Store the options."""
 
     return click.command(record).params
 
 
 def _read_recording_plan(path: Path, options: dict[str, Any], parts: bool = False) -> RecordingPlan:
-    """Read what options say of the files; Refused if one is wrong."""
+    """Read the settings of the files from options. Raise Refused if an option is wrong."""
     try:
         return read_plan(
             path,

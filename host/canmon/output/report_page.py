@@ -1,4 +1,4 @@
-"""The report of a log as one HTML page that needs nothing else, and as PDF and PNG of Chromium."""
+"""The report of a log as one self-contained HTML page, and as PDF and PNG made by Chromium."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _Around = Sequence[tuple[Record, Decoded]]
 
 _HERE: Final = Path(__file__).parent
 _MOST_POINTS: Final = 60_000
-"""Of all curves together: more would make the page larger than a mail may be."""
+"""Number of points of all curves together. More points would make the page too large for a mail."""
 _MOST_IDS: Final = 1_000
 _MOST_FAULTS: Final = 1_000
 _MOST_PLACES: Final = 100
@@ -67,8 +67,8 @@ class Verdict(NamedTuple):
 
     Attributes:
         diagnosis: the whole diagnosis.
-        around: by the number of a frame, the number of the first frame around it, and the frames
-            around it.
+        around: surroundings by the number of a frame: the number of the first frame around it, and
+            the frames around it.
     """
 
     diagnosis: Diagnosis
@@ -83,7 +83,7 @@ class ReportHead:
         title: title of the page.
         source: description of the source.
         about: lines at the end of the page, each with a text that is shown as code.
-        bit_rate: bit rate of the buses; None if unknown.
+        bit_rate: bit rate of the buses, or None if unknown.
     """
 
     title: str
@@ -93,7 +93,7 @@ class ReportHead:
 
 
 def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
-    """Return the page; the same values give the same bytes."""
+    """Return the page. The same values give the same bytes."""
     style, script = (_HERE.joinpath(f"page.{kind}").read_text("utf-8") for kind in ("css", "js"))
     parts = {
         "policy": escape(content_policy(style, script)),
@@ -111,7 +111,7 @@ def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
 
 
 def _plain(survey: Survey, verdict: Verdict) -> str:
-    """Return the findings without a script, as mail programs show a page."""
+    """Return the findings without a script, as mail programs display a page."""
     faults = verdict.diagnosis.faults[:_MOST_FAULTS]
     items = (
         f"<li>{survey.since(one.first_us) / 1e6:.6f} s, {escape(one_line(_title(one.rule)))}: "
@@ -127,7 +127,7 @@ def _page_json(value: object) -> str:
 
 
 def summary(survey: Survey, verdict: Verdict, head: ReportHead) -> list[str]:
-    """Return three sentences: what there was, who was there, and what is wrong."""
+    """Return three sentences about the traffic, the nodes, and the faults."""
     return [_what(survey, head), _who(survey.rows()), _wrong(verdict, survey.first_us or 0)]
 
 
@@ -145,7 +145,7 @@ def _what(survey: Survey, head: ReportHead) -> str:
 
 
 def _date(at_us: int) -> str:
-    """Write a date that is read in another place than where the log was made."""
+    """Return a date as text. The reader may be in another place than the log."""
     try:
         return f"{datetime.fromtimestamp(at_us // 1_000_000, UTC):%Y-%m-%d %H:%M:%S} UTC"
     except (ValueError, OverflowError, OSError):
@@ -261,7 +261,7 @@ def _finding(survey: Survey, fault: BusFault, verdict: Verdict) -> dict[str, obj
 
 
 def _title(rule: str) -> str:
-    """Return what a rule finds, since the name of a rule may say what it wants instead."""
+    """Return the violation that a rule finds. The name of a rule may state the demand instead."""
     text = RULES.get(rule, "")
     return text[:1].upper() + text[1:]
 
@@ -332,8 +332,8 @@ def _gaps(
 ) -> Thinned[Mark]:
     """Return the gaps that a finding confirms.
 
-    A survey detects a gap at once, from the heartbeats before it. The rules see the whole log, and
-    detect two nodes with one node-ID. A node with node guarding has no heartbeats to judge.
+    A survey detects a gap at once, from the heartbeats before the gap. The rules see the whole log,
+    and detect two nodes with one node-ID. A node with node guarding has no heartbeats to judge.
     """
     guarded = (row.channel, nmt.ERROR_CONTROL_COB_ID + row.node | REMOTE) in survey.counts.sums
     if guarded or "no-lost-heartbeat" not in diagnosis.judged:
@@ -360,7 +360,7 @@ def _gaps(
 
 
 def _seen(fault: BusFault) -> Iterable[tuple[int, int]]:
-    """Return the times of a finding; what has too many frames is one span at its end."""
+    """Return the times of a finding. A finding with too many frames is one span at its end."""
     yield from ((place.at_us, place.at_us) for place in fault.frames)
     if fault.amount > len(fault.frames):
         yield fault.frames[-1].at_us if fault.frames else fault.first_us, fault.last_us
@@ -371,7 +371,7 @@ def _latest(marks: Thinned[Mark]) -> str:
 
 
 def _pdo_counts(survey: Survey, row: NodeStatus) -> dict[int, int]:
-    """Return how many PDOs a node sent in each span: those that are known, else predefined ones."""
+    """Return the number of PDOs of a node in each span, by known PDOs, or else predefined ones."""
     known = pdo_contents(row)
     others = {pdo.can_id for pdo in known if pdo.receives}
     sent = {pdo.can_id for pdo in known if not pdo.receives}
@@ -389,7 +389,7 @@ def _bins(spans: Mapping[int, int], width_us: int) -> dict[str, object]:
 
 
 def _signals(survey: Survey, *, several: bool) -> list[dict[str, object]]:
-    """Return the signals with their values; the more there are, the wider their spans."""
+    """Return the signals with their values. With more signals, the spans are wider."""
     points = sum(len(spans) for spans in survey.values.ranges.values())
     shift = max(0, (points // _MOST_POINTS).bit_length())
     found = []
@@ -429,7 +429,7 @@ def _ranges(spans: Mapping[int, tuple[float, float]], shift: int) -> list[float]
 
 
 def _rounded(value: float) -> float:
-    """Return a number with as many digits as a picture shows."""
+    """Return a number with the number of digits that a picture shows."""
     short = float(f"{value:.6g}")
     return int(short) if short.is_integer() and abs(short) < 1e15 else short
 
@@ -453,7 +453,7 @@ def _idents(survey: Survey, rows: Sequence[NodeStatus], span_us: int) -> list[di
 
 
 def _meaning(ident: int) -> str:
-    """Return what the pre-defined connection set says of an identifier."""
+    """Return the meaning of an identifier in the pre-defined connection set."""
     can_id, remote = ident & ~REMOTE, ", asked for by a remote frame" * bool(ident & REMOTE)
     if can_id in _ALONE:
         return _ALONE[can_id] + remote
@@ -472,14 +472,14 @@ _WIDTH, _HEIGHT = 1280, 1600
 
 
 class BrowserError(ValueError):
-    """There is no Chromium, or it wrote nothing."""
+    """Chromium is not installed, or wrote nothing."""
 
 
 def browser() -> str:
     """Return the path of Chromium.
 
     Raises:
-        BrowserError: it is not there.
+        BrowserError: Chromium is not installed.
     """
     found = next(filter(None, map(shutil.which, _BROWSERS)), None)
     if found is None:
@@ -491,7 +491,10 @@ def browser() -> str:
 
 
 def _unboxed() -> Sequence[str]:
-    """Chromium refuses to run as root in its sandbox; in containers all is root."""
+    """Return the option to run Chromium as root.
+
+    Its sandbox refuses that, but containers run as root.
+    """
     return ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
 
 

@@ -1,9 +1,9 @@
 """Buses of python-can as a source.
 
-The kernel counts the frames that it drops because the queue of a socket is full. It passes this
-count with each frame that is read (socket(7), SO_RXQ_OVFL). It passes CAN FD and CAN XL frames only
-to sockets that enable them (linux, networking/can). This source enables both. It reads CAN FD
-frames, and only counts CAN XL frames.
+The kernel counts the frames that it drops because the queue of a socket is full. The kernel passes
+this count with each frame that is read (socket(7), SO_RXQ_OVFL). The kernel passes CAN FD and CAN
+XL frames only to sockets that enable them (linux, networking/can). This source enables both types.
+It reads CAN FD frames, and only counts CAN XL frames.
 """
 
 from __future__ import annotations
@@ -51,22 +51,22 @@ _XL_FLAG: Final = 0x80
 _STAMP: Final = struct.Struct("@ll")
 _COUNT: Final = struct.Struct("@I")
 _ANCILLARY_BYTES: Final = 128
-"""Room for time and count with their heads; CMSG_SPACE would say 56, where there is one."""
+"""Size of the buffer for time and count with their headers. CMSG_SPACE would give 56 bytes."""
 
 _MSG_CONFIRM: Final = 0x800
 
 
 class SocketReader:
-    """The socket of an open SocketCAN bus of python-can.
+    """Reader of the socket of an open SocketCAN bus of python-can.
 
     Args:
-        bus: the bus; no other code reads from it.
-        name: its channel name in records.
+        bus: open bus. No other code may read from the bus.
+        name: channel name of the bus in records.
 
     Attributes:
-        lost: frames that the kernel dropped because its queue was full.
-        tally: counts what was not a frame.
-        stepped: always False.
+        lost: number of frames that the kernel dropped because its queue was full.
+        tally: counts of items that are not frames.
+        stepped: whether time passes while the bus is read, which is always False.
     """
 
     stepped = False
@@ -82,7 +82,7 @@ class SocketReader:
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Record]:
-        """Wait for a first frame; LinkClosed if the bus is gone."""
+        """Wait for a first frame. Raise LinkClosed if the bus is gone."""
         records: list[Record] = []
         ready([self._socket], wait_s=timeout_us / 1e6)
         try:
@@ -119,7 +119,7 @@ class SocketReader:
 
 
 def _let_fd(bus: Any) -> None:
-    """Have a bus of SocketCAN send and hear CAN FD frames, where the kernel has them."""
+    """Make a SocketCAN bus send and receive CAN FD frames, if the kernel supports them."""
     with suppress(OSError):
         bus.socket.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FD_FRAMES, 1)
 
@@ -141,10 +141,10 @@ def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:
 
 
 _BATCH: Final = 1_024
-"""So that a bus that never falls silent cannot keep its reader."""
+"""Largest number of frames of one read, so that a busy bus cannot block its reader."""
 
 _DEFAULT: Final = "socketcan"
-"""The interface where neither the command line nor a configuration names one."""
+"""Default interface if neither the command line nor a configuration names one."""
 
 _UNREADABLE: Final = "frames that the driver could not read"
 
@@ -159,7 +159,7 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
         The bus, its interface, and the name of its channel.
 
     Raises:
-        Refused: options that are unknown to python-can.
+        Refused: python-can does not know an option.
         SourceFailed: the bus cannot be opened.
     """
     bus, interface, channel = open_raw(_with_interface(options))
@@ -179,18 +179,18 @@ def _with_interface(options: BusOptions) -> BusOptions:
 
 
 class BusReader:
-    """Any bus of python-can.
+    """Reader of any bus of python-can.
 
     Args:
-        bus: an open bus; no other code reads from it.
-        interface: its interface.
-        name: its channel name in records.
+        bus: open bus. No other code may read from the bus.
+        interface: python-can interface of the bus.
+        name: channel name of the bus in records.
 
     Attributes:
-        reads: reads the bus, and counts what its driver could not read.
-        lost: 0, because python-can does not report it.
-        tally: counts what was not a frame.
-        stepped: its time passes while it is read.
+        reads: reader of the bus, which also counts frames that the driver could not read.
+        lost: number of lost frames, which is 0 because python-can does not report it.
+        tally: counts of items that are not frames.
+        stepped: whether time passes while the bus is read.
     """
 
     def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:
@@ -199,7 +199,7 @@ class BusReader:
         self.reads = BusReceiver(bus, name)
 
     def read(self, timeout_us: int, /) -> list[Record]:
-        """Wait for a first frame; LinkClosed if the bus is gone."""
+        """Wait for a first frame. Raise LinkClosed if the bus is gone."""
         records: list[Record] = []
         faults, wait_us = self.reads.faults, timeout_us
         try:
@@ -224,28 +224,28 @@ class BusReader:
 
 
 BusSource = LiveSource[Record]
-"""One or more buses: all that comes are frames."""
+"""A source of one or more buses, in which all items are frames."""
 
 
 def _reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
-    """Return what reads an open bus."""
+    """Return a reader for an open bus."""
     return SocketReader(bus, name) if interface == "socketcan" else BusReader(bus, interface, name)
 
 
 class OpenBus:
-    """A bus named by a SOURCE word and options; it can be opened again.
+    """A bus that a SOURCE word and options name. The bus can be opened again.
 
     Args:
-        word: the SOURCE word.
-        options: its options on the command line.
+        word: SOURCE word of the bus.
+        options: options of the bus on the command line.
 
     Attributes:
-        bus: the bus as opened last.
+        bus: bus that was opened last.
         name: name of the bus.
 
     Raises:
-        Refused: options that are unknown to python-can.
-        SourceFailed: it cannot be opened.
+        Refused: python-can does not know an option.
+        SourceFailed: the bus cannot be opened.
     """
 
     def __init__(self, word: BusSpec, options: BusOptions) -> None:
@@ -254,11 +254,11 @@ class OpenBus:
 
     @property
     def reader(self) -> Reader[Record]:
-        """What reads it."""
+        """Reader of the bus."""
         return _reader_of(self.bus, self._interface, self.name)
 
     def open_again(self) -> Reader[Record]:
-        """Open it again; the previous user has closed it."""
+        """Open the bus again. The previous user has closed it."""
         self.bus, _, _ = open_bus(self._options)
         try:
             return self.reader
@@ -268,12 +268,13 @@ class OpenBus:
 
 
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
-    """Return the options of a bus; options in its SOURCE word override the others.
+    """Return the options of a bus. Options in the SOURCE word override the other options.
 
-    With -i, the whole word is the channel, including colons, unless it begins with that interface.
+    With -i, the whole word is the channel, including colons, unless the word begins with that
+    interface.
 
     Raises:
-        Refused: the word and -c name two channels.
+        Refused: the word and -c name different channels.
     """
     interface, channel = word.interface, word.channel
     if word.prefix and options.interface not in (None, interface):
@@ -292,7 +293,7 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
 
 
 def _local(interface: str | None) -> tuple[str, ...]:
-    """Return what keeps frames on this machine, unless the command line says otherwise."""
+    """Return options that keep frames on this machine, unless the command line overrides them."""
     return ("hop_limit=0",) if interface == INTERFACES["udp"] else ()
 
 
@@ -300,25 +301,25 @@ def _local(interface: str | None) -> tuple[str, ...]:
 
 
 _FD_WITHOUT_ASKING: Final = ("socketcan", "tickrig", "udp_multicast", "virtual")
-"""Interfaces that take CAN FD however they were opened, or say themselves that they do not."""
+"""Interfaces that accept CAN FD without an option, or that report that they do not support it."""
 
 _SEND_TIMEOUT_S: Final = 1
-"""How long a full queue of the driver may stay full."""
+"""Longest time that a queue of the driver may stay full."""
 
 
 class Transmitter:
-    """An open bus.
+    """An open bus for sending frames.
 
     Args:
-        word: SOURCE word of a bus; None if the options name it.
-        options: its options on the command line.
-        receives: whether to read received frames; otherwise they are discarded.
+        word: SOURCE word of the bus, or None if the options name the bus.
+        options: options of the bus on the command line.
+        receives: whether to read received frames. Otherwise they are discarded.
 
     Attributes:
         name: name of the bus.
 
     Raises:
-        Refused: the word names no bus.
+        Refused: the word does not name a bus.
         SourceFailed: the bus cannot be opened.
     """
 
@@ -337,13 +338,13 @@ class Transmitter:
             self._reads = reader.reads if isinstance(reader, BusReader) else None
 
     def send(self, frame: CanFrame | FdFrame) -> None:
-        """Send a frame; SourceFailed if the bus is gone, takes none for 1 s or no CAN FD."""
+        """Send a frame. Raise SourceFailed if the bus is gone, blocked for 1 s, or lacks CAN FD."""
         if isinstance(frame, FdFrame) and not self._takes_fd:
             raise SourceFailed(f"cannot send {frame} on {self.name}: CAN FD wants --fd")
         send_on(self._bus, self.name, frame)
 
     def poll(self, timeout_us: int) -> list[Record]:
-        """Wait for a first frame, then return all that are there.
+        """Wait for a first frame. Return all frames that have arrived.
 
         Raises:
             SourceFailed: the bus is gone.
@@ -371,7 +372,7 @@ class Transmitter:
 
 
 def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
-    """Send a frame on the named bus; SourceFailed if it is gone, or accepts no frame for 1 s."""
+    """Send a frame on the named bus. Raise SourceFailed if the bus is gone or blocked for 1 s."""
     try:
         bus.send(to_message(frame), _SEND_TIMEOUT_S)
     except Exception as error:  # drivers raise what they like
@@ -382,7 +383,7 @@ def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
 def transmitters(
     words: Sequence[str | None], options: BusOptions, *, receives: bool = False
 ) -> Iterator[list[Transmitter]]:
-    """Open buses, and close them behind the block."""
+    """Open buses, and close them after the block."""
     opened: list[Transmitter] = []
     try:
         for word in words:

@@ -1,4 +1,4 @@
-"""Serial ports as a source, like buses: the lines of the devices on them.
+"""Serial ports as a source, like buses, with the lines of the devices on them.
 
 A port can have only one reader. To listen to a host and its device, use two adapters, and connect
 the receive line of one to each of the two wires.
@@ -40,18 +40,18 @@ from tickrig.wire.rtc_lite.frame import (
 
 _LITE_KIND: Final = "rtc-lite"
 _FRAME_GAP_US: Final = 100_000
-"""After this pause, an incomplete frame is dropped (DECISION L7)."""
+"""Pause after which an incomplete frame is dropped (DECISION L7)."""
 _LOST_GAP_US: Final = 20_000
-"""After this pause, the search for a header starts again."""
+"""Pause after which the search for a header starts again."""
 _UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
 class RtcLiteLine:
-    """Decodes both directions of a line to an RTC-Lite device; chunking makes no difference.
+    """Decoder of both directions of a line to an RTC-Lite device. Chunking makes no difference.
 
     Args:
         channel: name of the line.
-        checksum: checksum of the frames.
+        checksum: checksum algorithm of the frames.
     """
 
     def __init__(self, channel: str, checksum: Checksum = Checksum.SUM8) -> None:
@@ -63,7 +63,7 @@ class RtcLiteLine:
         self._received_us = {True: 0, False: 0}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
-        """Take bytes of one direction; return the frames that are whole now."""
+        """Take bytes of one direction. Return the frames that are now complete."""
         decoder, gap_us = self._decoders[to_device], at_us - self._received_us[to_device]
         if gap_us >= (_LOST_GAP_US if decoder.lost else _FRAME_GAP_US):
             decoder.clear()
@@ -151,7 +151,7 @@ _KIND: Final = "rrc"
 
 
 class RrcLines:
-    """Decodes both directions of a line to an RRC; chunking makes no difference.
+    """Decoder of both directions of a line to an RRC. Chunking makes no difference.
 
     Args:
         channel: name of the line.
@@ -162,7 +162,7 @@ class RrcLines:
         self._splitters = {True: LineSplitter(), False: LineSplitter()}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
-        """Take bytes of one direction; return the lines that are whole now."""
+        """Take bytes of one direction. Return the lines that are now complete."""
         decode = _decode_command if to_device else _decode_reply
         return [
             LineRecord(at_us, self._channel, to_device, line, decode(line))
@@ -171,7 +171,7 @@ class RrcLines:
 
 
 def _decode_command(line: bytes) -> Decoded:
-    """Decode a line to the RRC, with or without CHECK at its end.
+    """Decode a line to the RRC, with or without CHECK at the end.
 
     >>> _decode_command(b"output1eff").text, _decode_command(b"output1e007").text
     ('output v_pct=30 w_pct=-1', 'output v_pct=30 w_pct=0')
@@ -216,7 +216,7 @@ def _command(command: Command) -> Decoded:
 
 
 def _signals(message: Command | StatusA) -> tuple[Signal, ...]:
-    """Return the fields of a message; a row of numbers is one text."""
+    """Return the fields of a message. A row of numbers is one text."""
     values = ((field.name, getattr(message, field.name)) for field in fields(message))
     return tuple(
         Signal(name, value if isinstance(value, int) else " ".join(map(str, value)))
@@ -225,7 +225,7 @@ def _signals(message: Command | StatusA) -> tuple[Signal, ...]:
 
 
 _Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
-"""What decodes a line by its name, and its usual bit/s."""
+"""Decoder of a line by its name, and its usual bit rate."""
 
 _DECODINGS: Final[dict[str, _Decoding]] = {
     "rrc": (RrcLines, 115_200),
@@ -235,16 +235,17 @@ _DECODINGS: Final[dict[str, _Decoding]] = {
 
 
 class LineReader:
-    """One serial port; nothing is sent on it.
+    """Reader of one serial port. It sends nothing.
 
     Args:
-        word: its port, protocol and direction.
+        word: port, protocol and direction as in a SOURCE word.
 
     Attributes:
-        name: name of its port.
-        lost: 0, because a serial port does not report it.
-        tally: empty; invalid bytes are reported as lines.
-        stepped: False: its time is real time.
+        name: name of the port.
+        lost: number of lost bytes, which is 0 because a serial port does not report it.
+        tally: counts of items, always empty because invalid bytes are reported as lines.
+        stepped: whether time passes while the port is read, which is False because its time is real
+            time.
 
     Raises:
         LinkClosed: the port cannot be opened.
@@ -258,7 +259,10 @@ class LineReader:
         self._link = SerialLink(word.port, word.baud or usual_baud)
 
     def read(self, timeout_us: int, /) -> list[LineRecord]:
-        """Wait for a first byte, then return the lines that are whole; LinkClosed if it is gone."""
+        """Wait for a first byte.
+
+        Return the complete lines. Raise LinkClosed if the port is gone.
+        """
         data = self._link.receive(timeout_us)
         at_us = time.time_ns() // 1_000
         return self._decoder.take(at_us, data, to_device=self._from_host) if data else []

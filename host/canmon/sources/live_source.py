@@ -1,4 +1,4 @@
-"""What comes in by itself as a source: a thread for each port reads into one bounded queue."""
+"""A live source, in which a thread for each port reads into one bounded queue."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ if TYPE_CHECKING:
 
 
 _QUEUE_FRAMES: Final = 200_000
-"""Ten seconds of the busiest bus of 1 Mbit/s."""
+"""Number of frames in the queue, which is ten seconds of the busiest bus of 1 Mbit/s."""
 
 _WAIT_US: Final = 100_000
-"""How long a thread may take to see that it shall end."""
+"""Longest time until a thread notices that it must end."""
 
 _Item = TypeVar("_Item", bound="Record | LineRecord")
 _Read_co = TypeVar("_Read_co", bound="Record | LineRecord", covariant=True)
 
 
 class Reader(Protocol[_Read_co]):
-    """An open bus or serial port.
+    """Reader of an open bus or serial port.
 
     Attributes:
         name: name of the bus or port.
-        tally: counts items that are not frames.
-        stepped: whether its time passes while it is read; it then belongs to the thread that opened
-            it.
+        tally: counts of items that are not frames.
+        stepped: whether time passes while the bus is read. Such a bus belongs to the thread that
+            opened it.
     """
 
     name: str
@@ -48,10 +48,10 @@ class Reader(Protocol[_Read_co]):
 
     @property
     def lost(self) -> int:
-        """Frames that its driver says it dropped."""
+        """Number of frames that the driver reports as dropped."""
 
     def read(self, timeout_us: int, /) -> Sequence[_Read_co | Mark]:
-        """Wait for a first frame; LinkClosed if the bus is gone.
+        """Wait for a first frame. Raise LinkClosed if the bus is gone.
 
         A mark at the beginning of the result means that the bus went away or is back.
         """
@@ -61,18 +61,18 @@ class Reader(Protocol[_Read_co]):
 
 
 class LiveSource(AnySource[_Item]):
-    """One or more buses or serial ports, read by a thread each.
+    """One or more buses or serial ports, each of which a thread reads.
 
     Frames that the caller has not fetched are kept up to a limit. Further frames are lost, and
-    counted. The caller itself reads a bus in virtual time: time passes while it polls.
+    counted. The caller itself reads a bus in virtual time, because time passes while it polls.
 
     Args:
-        readers: open buses and ports.
-        chosen: filter for the frames of each; None for all frames.
-        queue_frames: largest number of frames that are kept.
+        readers: readers of open buses and ports.
+        chosen: filter for the frames of each reader, or None for all frames.
+        queue_frames: maximum number of frames that are kept.
 
     Attributes:
-        failed: why a bus is gone.
+        failed: reason why a bus is gone.
     """
 
     live = True
@@ -100,35 +100,35 @@ class LiveSource(AnySource[_Item]):
 
     @property
     def ended(self) -> bool:
-        """Report that a bus is gone, and that all received frames were read."""
+        """Whether a bus is gone, and all received frames were read."""
         return (bool(self.failed) or self._stop) and not self._queue
 
     @property
     def away(self) -> list[str]:
-        """The buses that went away and are not back."""
+        """Buses that went away and are not back."""
         return [one.name for one in self._reopening() if one.away]
 
     @property
     def gaps(self) -> int:
-        """How often a bus went away and was to be opened again."""
+        """Number of times that a bus went away and had to be opened again."""
         return sum(one.gaps for one in self._reopening())
 
     def reopen(self) -> None:
-        """Open buses again that go away from now on, until they are back."""
+        """From now on, open buses that go away again, until they are back."""
         for one in self._reopening():
             one.wanted = True
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
-        """Return what was no frame, by the name of each bus or port."""
+        """Return the counts of items that are not frames, by the name of each bus or port."""
         return [(reader.name, reader.tally) for reader in self._readers]
 
     @property
     def lost(self) -> int:
-        """Frames that the drivers dropped or that found the queue full."""
+        """Number of frames that the drivers dropped or that did not fit the queue."""
         return self._overruns + sum(reader.lost for reader in self._readers)
 
     def poll(self, timeout_us: int, /) -> list[_Item]:
-        """Wait for a first frame, then return all that are there, up to a mark."""
+        """Wait for a first frame. Return all frames that have arrived, up to a mark."""
         self.marks = ()
         for reader, chosen in self._stepped:
             self._take(reader, chosen, timeout_us)
@@ -212,7 +212,7 @@ def _passes(chosen: CandumpFilter, one: Record | LineRecord | Mark) -> bool:
 
 
 REOPEN_US: Final = 500_000
-"""How long to wait before it is tried again."""
+"""Time to wait before opening a bus is tried again."""
 
 
 def _monotonic_us() -> int:
@@ -220,24 +220,24 @@ def _monotonic_us() -> int:
 
 
 class ReopeningReader(Generic[_Item]):
-    """A reader over several readers: it uses each one until its bus is gone.
+    """A reader that uses several readers in turn. It uses each one until its bus is gone.
 
     Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and then
     read without an error. Opening alone is not enough, because a SocketCAN bus that is down can be
     opened.
 
     Args:
-        reader: the first reader; it is open.
-        open_reader: opens the next reader.
-        clock: returns microseconds, with any origin.
-        wait: sleeps for a number of seconds.
+        reader: first reader, which is open.
+        open_reader: function that opens the next reader.
+        clock: function that returns microseconds, with any origin.
+        wait: function that sleeps for a number of seconds.
 
     Attributes:
         name: name of the first reader.
-        tally: counts what was not a frame in any of them.
-        stepped: always False.
+        tally: counts of items that are not frames, of all readers.
+        stepped: whether time passes while the bus is read, which is always False.
         wanted: whether to open the bus again.
-        gaps: number of times that it went away.
+        gaps: number of times that the bus went away.
     """
 
     stepped = False
@@ -257,7 +257,7 @@ class ReopeningReader(Generic[_Item]):
 
     @property
     def lost(self) -> int:
-        """Frames that the driver says it dropped, in all readers together."""
+        """Number of frames that the driver reports as dropped, of all readers together."""
         return self._lost + (0 if self._reader is None else self._reader.lost)
 
     @property
@@ -266,7 +266,7 @@ class ReopeningReader(Generic[_Item]):
         return self._gone_us is not None
 
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
-        """Wait for a first frame; add marks when the bus goes away and when it is back.
+        """Wait for a first frame. Add marks when the bus goes away and when it is back.
 
         Raises:
             LinkClosed: the bus is gone, and `wanted` is not set.
@@ -285,7 +285,7 @@ class ReopeningReader(Generic[_Item]):
         return [back(time.time_ns() // 1_000, self.name, away_us), *records]
 
     def losses(self) -> list[str]:
-        """Return how long it was away."""
+        """Report how long the bus was away."""
         if not self.gaps:
             return []
         now_away_us = 0 if self._gone_us is None else self._clock() - self._gone_us
@@ -302,7 +302,7 @@ class ReopeningReader(Generic[_Item]):
             reader.close()
 
     def _opened(self, timeout_us: int) -> Reader[_Item] | None:
-        """Try once more, or wait until that is due."""
+        """Try to open the bus once more, or wait until the next try is due."""
         early_us = self._due_us - self._clock()
         if early_us > 0:
             self._wait(min(early_us, timeout_us) / 1e6)
@@ -315,7 +315,7 @@ class ReopeningReader(Generic[_Item]):
         return reader
 
     def _leave(self, why: str) -> Sequence[Mark]:
-        """Close what is gone; say so the first time."""
+        """Close the reader whose bus is gone. Report this the first time."""
         self.close()
         now_us = self._clock()
         self._due_us = now_us + REOPEN_US

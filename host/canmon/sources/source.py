@@ -54,13 +54,13 @@ _Taken_co = TypeVar("_Taken_co", covariant=True)
 
 
 class AnySource(Generic[_Taken_co]):
-    """Frames, or lines of a serial port, as they arrive.
+    """A source of frames, or of lines of a serial port, as they arrive.
 
     Attributes:
-        live: whether new data arrive with time; False if all data exist already.
-        failed: why the source ended early; empty if it did not.
+        live: whether new data arrive with time. It is False if all data exist already.
+        failed: reason why the source ended early, empty if it did not.
         marks: events after the frames that `poll` returned last.
-        recorded: whether a recorder wrote these marks, and has already reported them.
+        recorded: whether a recorder wrote these marks and has already reported them.
     """
 
     live = recorded = False
@@ -70,7 +70,7 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def ended(self) -> bool:
-        """Whether no more will come."""
+        """Whether no more items will arrive."""
         return self._ended
 
     @property
@@ -80,36 +80,36 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def gaps(self) -> int:
-        """How often a bus went away and was to be opened again."""
+        """Number of times that a bus went away and had to be opened again."""
         return 0
 
     def reopen(self) -> None:
-        """Open buses again that go away; what has an end is left alone."""
+        """Open buses that go away again. A source with an end is not affected."""
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
-        """Return what was no frame, by the name of each bus or file."""
+        """Return the counts of items that are not frames, by the name of each bus or file."""
         return ()
 
     @property
     def lost(self) -> int:
-        """Frames that were lost before they were read, as far as it is reported."""
+        """Number of frames that were lost before they were read, as far as this is reported."""
         return sum(tally.lost for _, tally in self.tallies())
 
     @property
     def unread(self) -> int:
-        """Lines and frames that got here and could not be taken, as noise and CAN FD."""
+        """Number of lines and frames that arrived but were unreadable, such as noise and CAN FD."""
         return sum(tally.unread for _, tally in self.tallies())
 
     def poll(self, timeout_us: int, /) -> Sequence[_Taken_co]:
-        """Wait for a first frame, then return all that are there; none if none came."""
+        """Wait for a first frame. Return all frames that have arrived, or none."""
         return []
 
     def messages(self) -> list[str]:
-        """Report invalid and lost frames, one line each."""
+        """Report invalid and lost frames, with one line per message."""
         return [text for name, tally in self.tallies() for text in tally.messages(name)]
 
     def losses(self) -> list[str]:
-        """Report lost and unreadable frames, without what is not a frame by nature."""
+        """Report lost and unreadable frames, without items that are not meant to be frames."""
         return [text for name, tally in self.tallies() for text in tally.losses(name)]
 
     def errors(self) -> list[str]:
@@ -118,17 +118,17 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether frames came, and filters of SOURCE words or a cut left out all of them."""
+        """Whether there were frames, but filters of SOURCE words or a cut removed all of them."""
         return False
 
     @property
     def without_errors(self) -> str:
-        """Why no error frame can come, whatever happens; empty if some can."""
+        """Reason why the source cannot contain error frames, empty if it can."""
         told = [tally.without_errors for _, tally in self.tallies()]
         return told[0] if told and all(told) else ""
 
     def close(self) -> None:
-        """Give back what it holds; closing twice is no error."""
+        """Release the resources. You may close a source twice."""
         self._ended = True
 
 
@@ -139,10 +139,10 @@ INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}
 """Short names of python-can's interfaces."""
 
 _PROTOCOLS: Final = ("rrc", "rtc-lite", "rtc-lite-xor8")
-"""What is spoken on serial lines."""
+"""Protocols of serial lines."""
 
 _UDP_GROUP: Final = "239.74.163.2"
-"""The IPv4 group of python-can's udp_multicast."""
+"""IPv4 group of python-can's udp_multicast."""
 
 _BUS: Final = re.compile(
     r"(?:(?P<interface>[A-Za-z]\w*):)?(?P<channel>[^@]*)"
@@ -157,7 +157,7 @@ _FACTORS: Final = {"k": 1_000, "M": 1_000_000}
 
 @dataclass(frozen=True, slots=True)
 class FileSpec:
-    """A log file, and which frames of it are wanted."""
+    """A log file, with a filter for its frames."""
 
     path: Path
     chosen: CandumpFilter | None = None
@@ -165,12 +165,12 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A bus, and a filter for its frames; the options define the attributes that are None.
+    """A bus, with a filter for its frames. The options define the attributes that are None.
 
     A bus with a data bit rate is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon; it is part of the channel if -i names the interface.
+        prefix: text before the first colon. It is part of the channel if -i names the interface.
     """
 
     interface: str | None = None
@@ -183,13 +183,13 @@ class BusSpec:
 
 @dataclass(frozen=True, slots=True)
 class LineSpec:
-    """A serial port, and the protocol of its line.
+    """A serial port, with the protocol of its line.
 
     Attributes:
-        port: a device or pyserial URL.
-        baud: bit/s; None for the usual rate of the protocol.
-        protocol: one of `_PROTOCOLS`.
-        from_host: whether the received data are those that the host sends.
+        port: device name or pyserial URL of the port.
+        baud: baud rate in bit/s, or None for the usual rate of the protocol.
+        protocol: protocol of the line, one of `_PROTOCOLS`.
+        from_host: whether the received data are the data that the host sends.
     """
 
     port: str
@@ -199,10 +199,10 @@ class LineSpec:
 
 
 def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
-    """Read a SOURCE word; None is standard input.
+    """Read a SOURCE word. None stands for standard input.
 
     Raises:
-        Refused: it is none.
+        Refused: the word is not a SOURCE.
     """
     if word == "-":
         return None
@@ -261,12 +261,13 @@ def _chosen(filters: str) -> CandumpFilter | None:
 
 @dataclass(frozen=True, slots=True)
 class LogCut:
-    """The wanted part of a log; by default the whole log.
+    """The wanted part of a log. By default, it is the whole log.
 
     Attributes:
-        begin: beginning of the part; None for the first frame of the log.
-        end: end of the part; None for the last frame of the log.
-        earlier: called with each frame before the part, so that a decoder can learn from it.
+        begin: begin of the part, or None for the first frame of the log.
+        end: end of the part, or None for the last frame of the log.
+        earlier: function that is called with each frame before the part, so that a decoder can
+            learn from it.
     """
 
     begin: LogTime | None = None
@@ -278,7 +279,7 @@ class LogCut:
         return self.begin is not None or self.end is not None
 
     def __str__(self) -> str:
-        """Write it as its options."""
+        """Return the cut in the notation of its options."""
         return " ".join(
             f"--{name} {time.text}"
             for name, time in (("from", self.begin), ("to", self.end))
@@ -287,12 +288,12 @@ class LogCut:
 
 
 class _CutLog:
-    """Passes on the wanted part of a log.
+    """The wanted part of a log that is read.
 
-    Time may go back: each frame is compared with the limits by itself.
+    Time may go back. Each frame is compared with the limits by itself.
 
     Args:
-        cut: the wanted part.
+        cut: limits of the wanted part.
 
     Attributes:
         over: whether an item later than the part has arrived.
@@ -305,7 +306,10 @@ class _CutLog:
         self._first_us, self._last_us, self._passed = 0, 0, False
 
     def note(self, at_us: int) -> None:
-        """Take the time of the first frame of a file: the first of all is where times begin."""
+        """Record the time of the first frame of a file.
+
+        Times count from the first frame of all files.
+        """
         if self._origin_us is not None and self._origin_us <= at_us:
             return
         self._origin_us = self._first_us = self._last_us = at_us
@@ -316,14 +320,14 @@ class _CutLog:
             self._begin_us = -_NEVER_US
 
     def noted(self, items: Iterator[Item]) -> Iterator[Item]:
-        """Yield all items of a file, and take the time of the first."""
+        """Yield all items of a file, and record the time of the first frame."""
         for item in islice(items, 1):
             self.note(item.at_us)
             yield item
         yield from items
 
     def items(self, items: Sequence[Item]) -> list[Item]:
-        """Return those of the part; those in front of it are for who learns from them."""
+        """Return the items of the part. Earlier items go to `LogCut.earlier`."""
         if items and self._origin_us is None:
             self.note(items[0].at_us)
         passed: list[Item] = []
@@ -340,7 +344,7 @@ class _CutLog:
         return passed
 
     def block(self, block: Columns) -> Columns:
-        """Return those frames of a block that are of the part."""
+        """Return the frames of a block that belong to the part."""
         if len(block):
             if self._origin_us is None:
                 self.note(int(block.at_us[0]))
@@ -353,11 +357,11 @@ class _CutLog:
 
     @property
     def empty(self) -> bool:
-        """Whether frames came, and none was in the part."""
+        """Whether there were frames, but no frame was in the part."""
         return self._origin_us is not None and not self._passed
 
     def messages(self) -> list[str]:
-        """Report that the part is empty, and the range of the log; nothing if it is not empty."""
+        """Report an empty part with the range of the log, or nothing if the part is not empty."""
         if not self.empty:
             return []
         span_s = (self._last_us - self._first_us) / 1e6
@@ -376,11 +380,11 @@ _WHOLE: Final = LogCut()
 
 
 _BATCH: Final = 1_024
-"""Frames of one poll."""
+"""Number of frames of one poll."""
 
 
 class _LoggedSource(AnySource[Record]):
-    """A log: frames up to the next marks at a time."""
+    """A log that returns frames up to the next marks at a time."""
 
     recorded = True
 
@@ -391,12 +395,12 @@ class _LoggedSource(AnySource[Record]):
 
     @property
     def lost(self) -> int:
-        """Frames that its recorder lost in front of those that come next."""
+        """Number of frames that the recorder lost before the next frames."""
         return super().lost if self._ended and self._cut is None else self._said_lost
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether frames came, and a filter or a cut left out all of them."""
+        """Whether there were frames, but a filter or a cut removed all of them."""
         return self._cut is not None and self._cut.empty
 
     def messages(self) -> list[str]:
@@ -404,11 +408,11 @@ class _LoggedSource(AnySource[Record]):
         return [*super().messages(), *(self._cut.messages() if self._cut else ())]
 
     def _read(self, timeout_us: int) -> Sequence[Item]:
-        """Return the next records, or none; `_no_more` is set at the end."""
+        """Return the next records, or none. `_no_more` is set at the end."""
         return []
 
     def poll(self, timeout_us: int, /) -> list[Record]:
-        """Return the next frames, up to a mark; of a pipe it waits for some."""
+        """Return the next frames up to a mark. For a pipe, wait for some frames."""
         if self._ended:
             self.marks = ()
             return []
@@ -431,7 +435,7 @@ class _LoggedSource(AnySource[Record]):
         self.marks = [mark for mark in marks if mark.event != log_file.DROP]  # `lost` says these
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         super().close()
         self._items = ()
 
@@ -476,7 +480,7 @@ class FileSource(_LoggedSource):
         return batch
 
     def _chosen_items(self, file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
-        """Return what of a file passes its filter; all of it without one."""
+        """Return the items of a file that pass its filter, or all items without a filter."""
         chosen = file.chosen
         return items if chosen is None else self._passing(str(file.path), chosen, items)
 
@@ -493,11 +497,11 @@ class FileSource(_LoggedSource):
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether frames came, and a filter or a cut left out all of them."""
+        """Whether there were frames, but a filter or a cut removed all of them."""
         return super().nothing_passed or (self._no_more and self._silent == {*self._names})
 
     def messages(self) -> list[str]:
-        """Report invalid and lost frames, and filters that let nothing pass."""
+        """Report invalid and lost frames, and filters that no frame passed."""
         silent = [name for name in self._names if self._no_more and name in self._silent]
         return [
             *super().messages(),
@@ -505,13 +509,13 @@ class FileSource(_LoggedSource):
         ]
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         super().close()
         self._stream = iter(())
 
 
 def _check_readable(path: Path) -> None:
-    """Raise SourceFailed where a file cannot be read."""
+    """Raise SourceFailed if a file cannot be read."""
     try:
         path.open("rb").close()
     except OSError as error:
@@ -527,7 +531,7 @@ _READ_BYTES: Final = 1 << 16
 
 
 class StdinSource(_LoggedSource):
-    """A pipe, a terminal or a file that another program feeds."""
+    """A pipe, a terminal, or a file that another program writes."""
 
     live = True
 
@@ -536,11 +540,11 @@ class StdinSource(_LoggedSource):
         self._descriptor, self._lines = descriptor, LogLines()
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
-        """Return the tally of what came."""
+        """Return the tally of the input."""
         return [("standard input", self._lines.tally)]
 
     def _read(self, timeout_us: int) -> Sequence[Item]:
-        """Wait for bytes; return what the lines hold that are whole."""
+        """Wait for bytes. Return the content of complete lines."""
         if not ready([self._descriptor], wait_s=timeout_us / 1e6)[0]:
             return []
         try:
@@ -555,14 +559,14 @@ class StdinSource(_LoggedSource):
 # A log file that is read in blocks, where that is faster than frame by frame.
 
 SMALL_BYTES: Final = 1 << 20
-"""Below it a log is read frame by frame sooner than numpy is imported."""
+"""Size below which reading a log frame by frame is faster than importing numpy."""
 
 
 class BlockLog(AnySource["Columns"]):
-    """A log file as columns, one block for each poll; it holds only one block in memory.
+    """A log file as columns, with one block for each poll. It holds only one block in memory.
 
     Attributes:
-        no_columns: whether it ended early because the file must be read frame by frame.
+        no_columns: whether reading ended early because the file must be read frame by frame.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -582,7 +586,7 @@ class BlockLog(AnySource["Columns"]):
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether frames came, and none was in the part that is wanted."""
+        """Whether there were frames, but no frame was in the wanted part."""
         return self._cut is not None and self._cut.empty
 
     def messages(self) -> list[str]:
@@ -590,7 +594,7 @@ class BlockLog(AnySource["Columns"]):
         return [*super().messages(), *(self._cut.messages() if self._cut else ())]
 
     def poll(self, timeout_us: int, /) -> list[Columns]:
-        """Return the next block; it never waits."""
+        """Return the next block. The method never waits."""
         try:
             block = next(self._blocks)
             return [block if self._cut is None else self._cut.block(block)]
@@ -608,7 +612,7 @@ class BlockLog(AnySource["Columns"]):
 
 
 class PieceLog(_LoggedSource):
-    """A log file in pieces: columns if possible, otherwise frames up to the next marks.
+    """A log file in pieces, as columns if possible, or else as frames up to the next marks.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -627,7 +631,7 @@ class PieceLog(_LoggedSource):
         return [(str(self._path), self._reader.tally)]
 
     def pieces(self) -> Iterator[Columns | Sequence[Record]]:
-        """Read the file; `lost` and `marks` are of what is behind each piece."""
+        """Read the file. `lost` and `marks` belong to the place after each piece."""
         ahead: Columns | Sequence[Item] | None = ()
         while not self._ended:
             if not self._items:
@@ -658,29 +662,29 @@ class PieceLog(_LoggedSource):
 
 
 def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
-    """Open the log that SOURCE words name; return None if it should be read frame by frame.
+    """Open the log that SOURCE words name. Return None if it should be read frame by frame.
 
     Args:
         words: SOURCE words.
-        cut: the wanted part of the log. If its `earlier` takes frames before the part, the result
-            is None.
+        cut: wanted part of the log. If its `earlier` takes frames before the part, the result is
+            None.
 
     Raises:
-        Refused: words that do not name a source.
-        SourceFailed: a file that cannot be read.
+        Refused: the words do not name a source.
+        SourceFailed: a file cannot be read.
     """
     path = None if cut.earlier else _large_log(words)
     return None if path is None else BlockLog(path, cut)
 
 
 def piece_log(words: Sequence[str], cut: LogCut = _WHOLE) -> PieceLog | None:
-    """Open the log that SOURCE words name in pieces; None and errors as `block_log`."""
+    """Open the log that SOURCE words name in pieces. None and errors are as in `block_log`."""
     path = None if cut.earlier else _large_log(words)
     return None if path is None else PieceLog(path, cut)
 
 
 def _large_log(words: Sequence[str]) -> Path | None:
-    """Return the path of a log that is to be read in blocks."""
+    """Return the path of a log that should be read in blocks."""
     if len(words) != 1 or find_spec("numpy") is None:
         return None
     word = parse_source(words[0])
@@ -695,18 +699,18 @@ def _large_log(words: Sequence[str]) -> Path | None:
 def open_source(
     words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
 ) -> Source:
-    """Open the source that SOURCE words name: one or more buses, files, or standard input.
+    """Open the source that SOURCE words name, which is one or more buses, files, or standard input.
 
     Files are merged by time. Buses are read as frames arrive.
 
     Args:
-        words: SOURCE words; without words the options name a bus.
+        words: SOURCE words. Without words, the options name a bus.
         options: interface, bit rate and other options of the buses.
-        cut: the wanted part of the files or of standard input; a bus is then refused.
+        cut: wanted part of the files or of standard input. With a part, a bus is refused.
 
     Raises:
-        Refused: words that do not name a source, or sources that cannot be combined.
-        SourceFailed: a bus or file that cannot be opened.
+        Refused: the words do not name a source, or the sources cannot be combined.
+        SourceFailed: a bus or file cannot be opened.
     """
     options = options or BusOptions()
     if not words and not options:
@@ -732,7 +736,10 @@ def open_source(
 def open_any(
     words: Sequence[str], options: BusOptions, cut: LogCut = _WHOLE
 ) -> AnySource[AnyRecord]:
-    """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
+    """Open the source of SOURCE words as `open_source` does.
+
+    Serial ports and buses may be mixed.
+    """
     parsed = [parse_source(word) for word in words]
     lines = [word for word in parsed if isinstance(word, LineSpec)]
     if not lines or cut:
@@ -752,8 +759,8 @@ def open_live(
         The source, and the buses to send on, by name.
 
     Raises:
-        Refused: options that are unknown to python-can.
-        SourceFailed: a bus or port that cannot be opened.
+        Refused: python-can does not know an option.
+        SourceFailed: a bus or port cannot be opened.
     """
     opened: dict[str, bus_source.OpenBus] = {}
     readers: list[live_source.Reader[AnyRecord]] = []
@@ -782,5 +789,5 @@ def open_live(
 
 
 def is_live(word: str) -> bool:
-    """Return whether a SOURCE word names something without an end: not a log file."""
+    """Return whether a SOURCE word names something without an end, which is not a log file."""
     return not isinstance(parse_source(word), FileSpec)

@@ -1,4 +1,4 @@
-"""The monitor: tabs of panels over one session."""
+"""The monitor, with tabs of panels that share one session."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ else:  # python-can is slow
 # A task that records the traffic on request.
 
 _LOOK_US: Final = 100_000
-"""How often it is called while no frame comes."""
+"""Interval of calls while no frame arrives."""
 
 _WORDS: Final = "run.log"
 
@@ -63,15 +63,15 @@ _Light = tuple[str, str]
 
 
 class RecorderTask(Task):
-    """Records in parts, so that no earlier file is overwritten.
+    """Recorder that writes in parts, so that no earlier file is overwritten.
 
     Args:
-        session: the source of the traffic.
+        session: session with the source of the traffic.
 
     Attributes:
-        section: its table in the workspace.
+        section: name of the recorder's table in the workspace.
         words: arguments of the recording, as for `canmon dump -l`.
-        recorder: the current or last recorder; None before the first.
+        recorder: current or last recorder, or None before the first recorder.
     """
 
     section: Final = "record"
@@ -85,12 +85,12 @@ class RecorderTask(Task):
 
     @property
     def due_us(self) -> int:
-        """When it is next called without a frame."""
+        """Time of the next call without a frame."""
         return self._due_us
 
     @property
     def running(self) -> bool:
-        """Whether it records, or waits for a trigger."""
+        """Whether the recorder records, or waits for a trigger."""
         recorder = self.recorder
         return recorder is not None and recorder.state in (
             RecorderState.WAITING,
@@ -99,14 +99,14 @@ class RecorderTask(Task):
 
     @property
     def failed(self) -> str:
-        """Why the latest recording ended before its time; empty if it did not."""
+        """Reason why the latest recording ended early, empty if it did not."""
         return "" if self.recorder is None else self.recorder.failed
 
     def start(self, words: str) -> None:
-        """Begin a recording; from now on, buses that go away are opened again.
+        """Begin a recording. From now on, buses that go away are opened again.
 
         Raises:
-            ValueError: the words do not name a recording, or it cannot be written.
+            ValueError: the words do not name a recording, or the recording cannot be written.
         """
         session = self._session
         self.end()
@@ -127,7 +127,7 @@ class RecorderTask(Task):
         session.source.reopen()
 
     def end(self) -> list[str]:
-        """End the recording; say how it went."""
+        """End the recording. Report the result."""
         with self._session.lock:
             self._due_us = NEVER
             if self.recorder is None:
@@ -136,13 +136,13 @@ class RecorderTask(Task):
             return self.recorder.messages()
 
     def trigger(self) -> None:
-        """Record what was kept and what comes."""
+        """Record the kept and the following frames."""
         with self._session.lock:
             if self.recorder is not None:
                 self.recorder.trigger("key", self._session.model.now_us)
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Record; it sends nothing."""
+        """Record the frames. Nothing is sent."""
         session, recorder = self._session, self.recorder
         if recorder is not None and self._due_us != NEVER:
             self._due_us = now_us + _LOOK_US
@@ -151,7 +151,7 @@ class RecorderTask(Task):
         return ()
 
     def light(self) -> list[_Light]:
-        """Return what the line at the bottom says of it."""
+        """Return the text about the recorder for the status line."""
         recorder = self.recorder
         if recorder is None or (self._due_us == NEVER and not recorder.failed):
             return []
@@ -168,11 +168,11 @@ class RecorderTask(Task):
                 return [(f" REC ENDED: {recorder.ended} ", "bold yellow")]
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take what was recorded last; SettingError if it is none."""
+        """Load the arguments of the last recording. Raise SettingError if they are invalid."""
         self.words = workspace.text_of(settings, "words", self.words)
 
     def save(self) -> dict[str, Any]:
-        """Return what was recorded last."""
+        """Return the arguments of the last recording."""
         return {"words": self.words}
 
 
@@ -185,11 +185,11 @@ _ALARM: Final = "bold red"
 
 
 class StatusLine(Widget):
-    """Shows a status; a click on its first word arms or disarms.
+    """A line that shows the status. A click on its first word arms or disarms.
 
     Args:
         session: the session whose status it shows.
-        recorder: the recorder.
+        recorder: recorder of the monitor.
     """
 
     DEFAULT_CSS = "StatusLine { height: 1; background: $boost; }"
@@ -201,7 +201,7 @@ class StatusLine(Widget):
         self.line: Line = ()
 
     def refresh_view(self) -> None:
-        """Show how things are now; called ten times a second."""
+        """Show the present status. This is called ten times a second."""
         with self._session.lock:
             line = self._status()
         if line != self.line:
@@ -209,7 +209,7 @@ class StatusLine(Widget):
             self.refresh()
 
     def _status(self) -> Line:
-        """Return the line: who may send, the buses, counts, what is wrong."""
+        """Return the status line, with armed or not, the buses, counts, and faults."""
         session, model = self._session, self._session.model
         self._counts = [*self._counts[-10:], model.frames]
         line = [ARMED if session.armed else _LISTENING, *self._recorder.light()]
@@ -242,7 +242,7 @@ class StatusLine(Widget):
 
 
 class _ExportScreen(ModalScreen[str]):
-    """A field for the name of a file; Escape leaves without one.
+    """A field for the name of a file. Escape leaves it without a name.
 
     Args:
         name: initial content of the field.
@@ -269,27 +269,27 @@ class _ExportScreen(ModalScreen[str]):
         yield field
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Take the name."""
+        """Accept the name."""
         self.dismiss(event.value.strip())
 
     def action_leave(self) -> None:
-        """Take none."""
+        """Leave without a name."""
         self.dismiss("")
 
 
 # The screen as a picture.
 
 _FONTS: Final = re.compile(r"@font-face \{[^}]*\}")
-"""Textual names fonts of another site; without them a reader's own are taken."""
+"""Pattern of web fonts of Textual. Without them, the fonts of the reader are used."""
 _CELL: Final = (8, 17)
 _GROUND, _INK = "#121212", "#e0e0e0"
 
 
 def _write_png(path: Path, strips: Sequence[Strip]) -> None:
-    """Write lines of a screen as PNG, by Pillow and a font of matplotlib.
+    """Write lines of a screen as PNG with Pillow and a font of matplotlib.
 
     Raises:
-        ImportError: matplotlib is not there.
+        ImportError: matplotlib is not installed.
     """
     from matplotlib import get_data_path  # noqa: PLC0415 - an extra
     from PIL import Image, ImageDraw, ImageFont  # noqa: PLC0415 - with it
@@ -326,7 +326,7 @@ def _write_png(path: Path, strips: Sequence[Strip]) -> None:
 
 
 class _Work(NamedTuple):
-    """A session, and what shows and keeps it."""
+    """A session, with the panels that show it, and its stored settings."""
 
     session: Session
     panels: tuple[Panel, ...]
@@ -348,7 +348,7 @@ def _ends(setup: workspace.MonitorSetup) -> set[tuple[str | None, str | None]]:
 
 
 def _read_files(setup: workspace.MonitorSetup) -> EdsFiles:
-    """Read the EDS files; InputError if one is none."""
+    """Read the EDS files. Raise InputError if a file is not an EDS."""
     with fields.of_field("eds"):
         objects = {node: read_eds_objects(path, node) for node, path in setup.eds.items()}
     with fields.of_field("eds_dir"):
@@ -356,7 +356,7 @@ def _read_files(setup: workspace.MonitorSetup) -> EdsFiles:
 
 
 _FIELDS: Final = {"trace": "filter", "alarms": "rules"}
-"""Fields of settings, by the panels that take them."""
+"""Fields of settings, by the panels that use them."""
 
 
 def _hand_on(
@@ -365,7 +365,7 @@ def _hand_on(
     changes: dict[str, Any],
     buses: Mapping[str, object],
 ) -> None:
-    """Give settings of a panel to another one, with changes; InputError if one is wrong."""
+    """Pass settings of a panel to another panel, with changes. Raise InputError if one is wrong."""
     scratch = workspace.Workspace()
     scratch.put(before.section, before.save())
     settings = scratch.section(before.section) | changes
@@ -380,21 +380,21 @@ def _hand_on(
 _PAINT_S: Final = 0.1
 _SAVE_S: Final = 2.0
 _SWITCH_S: Final = 0.002
-"""How long the screen may keep the session from running."""
+"""Longest time that the screen may keep the session from running."""
 
 
 class MonitorApp(FramedApp):
-    """Tabs, keys, help and the status line.
+    """The monitor app with tabs, keys, help and the status line.
 
     Args:
-        session: the traffic, and the means to send; the caller of the app starts it.
-        panels: the tabs.
-        panel_settings: stores their settings; None stores them only on export.
-        recorder: the recorder; by default a new one.
+        session: session with the traffic and the buses to send on. The caller of the app starts it.
+        panels: panels that are the tabs.
+        panel_settings: storage of the panels' settings. None stores the settings only on export.
+        recorder: recorder of the monitor. By default, it is a new recorder.
 
     Attributes:
         reopens: whether buses that go away are opened again.
-        asks: whether the app begins with the settings, because no source was named.
+        asks: whether the app begins with the settings screen, because no source was named.
     """
 
     TITLE = "canmon"
@@ -444,7 +444,7 @@ class MonitorApp(FramedApp):
         yield KeyFooter()
 
     def on_mount(self) -> None:
-        """Begin to paint."""
+        """Start updating the screen."""
         self.set_interval(_PAINT_S, self.refresh_view)
         self.set_interval(_SAVE_S, self.save)
         if self.asks:
@@ -453,7 +453,7 @@ class MonitorApp(FramedApp):
             self.notify(f"not known here, and kept: {', '.join(unknown)}", severity="warning")
 
     def run_session(self) -> None:
-        """Read the source in a thread and show the panels until they are left."""
+        """Read the source in a thread. Show the panels until the user leaves."""
         before_s, said = sys.getswitchinterval(), []
         sys.setswitchinterval(_SWITCH_S)
         with self.ended_by_signals():
@@ -475,23 +475,23 @@ class MonitorApp(FramedApp):
             raise SourceFailed(self.recorder.failed)
 
     def end(self) -> None:
-        """Send nothing more at once, then end the app."""
+        """Stop sending at once, then end the app."""
         self.session.armed = False
         super().end()
 
     def save(self) -> None:
-        """Keep the settings."""
+        """Store the settings."""
         if trouble := self.panel_settings.save():
             self.notify(trouble, severity="error", timeout=10)
 
     @property
     def shown(self) -> Panel:
-        """The panel that is on the screen."""
+        """Panel that is on the screen."""
         active = self.query_one(TabbedContent).active
         return next(panel for panel in self.panels if _tab(panel) == active)
 
     def refresh_view(self) -> None:
-        """Paint what is on the screen."""
+        """Update the panel that is on the screen."""
         self.session.check()
         if self.screen_stack and not self._moving and self.query(StatusLine):
             while self.session.notes:
@@ -500,7 +500,7 @@ class MonitorApp(FramedApp):
             self.query_one(StatusLine).refresh_view()
 
     def on_tabbed_content_tab_activated(self) -> None:
-        """Let the keys go to the panel, and paint it at once."""
+        """Pass the keys to the panel, and update it at once."""
         self._section = self.shown.section
         if not self.shown.query("*:focus"):
             self.shown.enter()
@@ -512,7 +512,7 @@ class MonitorApp(FramedApp):
             self.query_one(TabbedContent).active = _tab(self.panels[number - 1])
 
     def action_arm(self) -> None:
-        """Let panels send, or stop them."""
+        """Arm or disarm sending by the panels."""
         if self.session.armed:
             self.session.disarm()
         elif self.session.can_send:
@@ -521,7 +521,7 @@ class MonitorApp(FramedApp):
             self.notify("nothing is sent into a log", severity="warning")
 
     def action_export(self) -> None:
-        """Ask for a file and keep the settings there."""
+        """Ask for a file, and store the settings in this file."""
         path = self.panel_settings.workspace.path
         self.push_screen(_ExportScreen("" if path is None else str(path)), self._export)
 
@@ -535,7 +535,7 @@ class MonitorApp(FramedApp):
             self.notify(f"settings are kept in {name}")
 
     def action_settings(self) -> None:
-        """Show what is set, and apply what is changed."""
+        """Show the settings screen, and apply changes."""
         trace, alarms = self._panel(TracePanel), self._panel(AlarmsPanel)
         now = fields.MonitorSettings(
             self.panel_settings.setup,
@@ -549,7 +549,7 @@ class MonitorApp(FramedApp):
         self.notify("settings are applied" + ("; w keeps them in a file" if path is None else ""))
 
     def _apply(self, before: fields.MonitorSettings, after: fields.MonitorSettings) -> None:
-        """Use other settings; InputError if they cannot be used: then nothing has changed."""
+        """Apply other settings. Raise InputError without a change if they cannot be used."""
         changes: dict[str, dict[str, Any]] = {}
         if after.filter != before.filter:
             changes["trace"] = {"filter": after.filter}
@@ -580,11 +580,11 @@ class MonitorApp(FramedApp):
         after: workspace.MonitorSetup,
         changes: Mapping[str, dict[str, Any]],
     ) -> _Work:
-        """Open other buses or read other files, and end the present ones; InputError if that fails.
+        """Open other buses or files in place of the present ones. Raise InputError if that fails.
 
-        A bus that is among the old and the new ones is closed first, because most adapters can be
-        opened only once. If it cannot be opened with the new settings, it is opened with the old
-        ones.
+        A bus that is in both the old and the new settings is closed first, because most adapters
+        can be opened only once. If the bus cannot be opened with the new settings, it is opened
+        with the old ones.
         """
         old, files = self.session, _read_files(after)
         with fields.of_field("dbc"):
@@ -623,7 +623,7 @@ class MonitorApp(FramedApp):
         session.source.close()
 
     def _open_again(self, session: Session, setup: workspace.MonitorSetup) -> None:
-        """Let a session go on that was closed for others, which did not open."""
+        """Continue a session that was closed for other sources, which could not be opened."""
         try:
             again = open_session(setup.source, setup.options, Model())
         except (Refused, SourceFailed) as error:
@@ -639,7 +639,7 @@ class MonitorApp(FramedApp):
         setup: workspace.MonitorSetup,
         changes: Mapping[str, dict[str, Any]],
     ) -> _Work:
-        """Return panels for a session, set as those that are shown, but for some changes."""
+        """Return new panels for a session, with the settings of the shown panels and changes."""
         panels, recorder = make_panels(session, session.notes.append), RecorderTask(session)
         by_section = {panel.section: panel for panel in panels}
         for one in self.panels:
@@ -653,7 +653,7 @@ class MonitorApp(FramedApp):
         return _Work(session, tuple(panels), recorder, panel_settings)
 
     async def _move(self, work: _Work) -> None:
-        """Show another session in the place of the one that was closed."""
+        """Show another session in place of the closed session."""
         started = self.session.started
         self.session, self.panels, self.recorder, self.panel_settings = work
         base = self.screen_stack[0]
@@ -673,7 +673,7 @@ class MonitorApp(FramedApp):
         return next((panel for panel in self.panels if isinstance(panel, kind)), None)
 
     def action_picture(self) -> None:
-        """Ask for a file, and save the screen there as a picture."""
+        """Ask for a file, and save the screen as a picture."""
         name = f"canmon-{self.shown.title}.svg"
         self.push_screen(_ExportScreen(name, "save the screen as", ".svg or .png"), self._picture)
 
@@ -689,7 +689,7 @@ class MonitorApp(FramedApp):
         self.notify(said)
 
     def _write_picture(self, path: Path) -> str:
-        """Write the screen; return what was written. ValueError for another ending."""
+        """Write the screen as a picture. Return a message. Raise ValueError for other suffixes."""
         if path.suffix.lower() not in (".svg", ".png"):
             raise ValueError(f"{path}: a picture of the screen is .svg or .png")
         said = f"{path} is written"
@@ -707,7 +707,7 @@ class MonitorApp(FramedApp):
         return said
 
     def action_times(self) -> None:
-        """Write times otherwise, in all tabs."""
+        """Change the format of times in all tabs."""
         self.session.next_stamp()
         self.refresh_view()
 
@@ -719,7 +719,7 @@ class MonitorApp(FramedApp):
             self.call_after_refresh(trace.show_frame, event.at_us, event.record)
 
     def action_record(self) -> None:
-        """Ask what to record, or end the recording."""
+        """Ask for a recording, or end the recording."""
         if self.recorder.running:
             self.notify("\n".join(self.recorder.end()), markup=False)
         elif not self.session.source.live:
@@ -736,13 +736,13 @@ class MonitorApp(FramedApp):
                 self.notify(str(error), severity="error", markup=False)
 
     def action_trigger(self) -> None:
-        """Record what was kept and what comes."""
+        """Record the kept and the following frames."""
         if not self.recorder.running:
             self.notify("nothing waits for a trigger: F8 records, as run.log --pre 5s")
         self.recorder.trigger()
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Offer the tabs, and the keys of the frame and of the panel on the screen, by name."""
+        """Yield the tabs, and the keys of the frame and of the visible panel, by name."""
         yield from super().get_system_commands(screen)
         for number, panel in enumerate(self.panels, 1):
             yield SystemCommand(panel.title, f"show tab {number}", partial(self.action_tab, number))
@@ -753,7 +753,7 @@ class MonitorApp(FramedApp):
                     yield SystemCommand(binding.description, f"key {binding.key}", run)
 
     def action_stop(self) -> None:
-        """Stop all that sends, at once."""
+        """Stop everything that sends, at once."""
         self.session.disarm()
 
 

@@ -1,4 +1,4 @@
-"""A source that is read in a thread, and what is sent on its buses."""
+"""A source that a thread reads, and the frames that are sent on its buses."""
 
 from __future__ import annotations
 
@@ -72,29 +72,29 @@ else:  # python-can is slow
 # disarms, and reports why.
 
 DecodedFrame = tuple[Record, Decoded]
-"""A frame and what it means."""
+"""A frame and its meaning."""
 
 
 class Model:
     """The traffic, decoded and counted.
 
     Args:
-        eds: contents of EDS files, by node-ID.
+        eds: content of EDS files by node-ID.
         dbc: DBC files.
-        bit_rate: bit rate of the buses; None if unknown.
-        data_bit_rate: bit rate of the data phase of CAN FD frames with BRS; None if unknown.
+        bit_rate: bit rate of the buses, or None if unknown.
+        data_bit_rate: bit rate of the data phase of CAN FD frames with BRS, or None if unknown.
 
     Attributes:
-        eds: contents of EDS files, by node-ID.
-        decoder: decodes all frames.
-        board: the nodes.
-        top: the traffic, and the settings of its display in the statistics.
-        trace: the latest frames.
+        eds: content of EDS files by node-ID.
+        decoder: decoder of all frames.
+        board: board with the nodes.
+        top: traffic, and the settings of its display in the statistics.
+        trace: trace of the latest frames.
         frames: number of frames, including error frames.
-        now_us: the time at the source.
-        lost: frames that were lost before they were read.
-        unread: items that were not frames of CAN or CAN FD.
-        failed: why the source ended early; empty if it did not.
+        now_us: time at the source.
+        lost: number of frames that were lost before they were read.
+        unread: number of items that were not frames of CAN or CAN FD.
+        failed: reason why the source ended early, empty if it did not.
         ended: whether the source has ended.
         away: buses that went away and are not back.
     """
@@ -116,7 +116,7 @@ class Model:
         self.away: Sequence[str] = ()
 
     def take(self, records: Sequence[AnyRecord]) -> list[DecodedFrame]:
-        """Process records; return the frames with their meanings."""
+        """Process records. Return the frames with their meanings."""
         decoded_frames: list[DecodedFrame] = []
         for record in records:
             if isinstance(record, Record):
@@ -139,58 +139,58 @@ _MARKS_KEPT: Final = 1_000
 _SILENT_US: Final = 3_000_000
 
 _Send = Callable[[CanFrame | FdFrame], None]
-"""Sends a frame on one bus; SourceFailed if it cannot."""
+"""Function that sends a frame on one bus. It raises SourceFailed if it cannot."""
 
 
 class Task(Protocol):
-    """A task that receives all frames, and may send frames; called in the session's thread.
+    """A task that receives all frames, and may send frames. The session's thread calls the task.
 
     Attributes:
-        channel: the bus on which it sends; empty for the first bus.
+        channel: bus on which the task sends, empty for the first bus.
     """
 
     channel: str = ""
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame; `NEVER` if not."""
+        """Time of the next call without a frame, or `NEVER`."""
         return NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
-        """Process records, including frames of this program; return the frames to send.
+        """Process records, including frames of this program. Return the frames to send.
 
         Args:
-            now_us: the session's time, not that of the frames.
+            now_us: time of the session, which is not the time of the frames.
             records: frames since the last call.
         """
 
     def stop(self) -> None:
-        """Send no more: the operator has disarmed."""
+        """Stop sending, because the operator has disarmed the session."""
         return
 
 
 class Session:
-    """Reads a source, feeds the model and the tasks, and sends the frames of the tasks.
+    """A session that reads a source, feeds the model and the tasks, and sends frames of the tasks.
 
-    While the session is not armed, nothing is sent: frames of tasks are withheld, and counted. Hold
+    While the session is not armed, nothing is sent. Frames of tasks are withheld, and counted. Hold
     `lock` to read the model or to use a task.
 
     Args:
         source: source of the frames.
-        model: processes them.
-        buses: the buses to send on, by channel; empty for a log.
-        clock: the session's time in microseconds.
+        model: model that processes the frames.
+        buses: buses to send on, by channel. It is empty for a log.
+        clock: function that returns the time of the session in microseconds.
 
     Attributes:
-        lock: of the model and the tasks.
-        tasks: process records and return frames to send.
-        marks: which buses went away or came back, until a task takes them.
+        lock: lock that protects the model and the tasks.
+        tasks: tasks that process records and return frames to send.
+        marks: marks about buses that went away or came back, until a task takes them.
         armed: whether frames are sent.
         sent: number of sent frames.
-        withheld: number of frames not sent because it was not armed.
-        trouble: why a frame could not be sent; empty if all could.
+        withheld: number of frames that were not sent because the session was not armed.
+        trouble: reason why a frame could not be sent, empty if all frames could be sent.
         notes: messages for the user, until they are shown.
-        stamp: time format of all tabs.
+        stamp: format of times in all tabs.
         words: options and SOURCE words that name the buses on a command line.
     """
 
@@ -219,12 +219,12 @@ class Session:
 
     @property
     def now_us(self) -> int:
-        """The session's time, for tasks."""
+        """Time of the session, used by tasks."""
         return self._clock()
 
     @property
     def silent(self) -> bool:
-        """Whether nothing came on a bus for some seconds since it was opened."""
+        """Whether no frame arrived on a bus for some seconds after the bus was opened."""
         waited_us = self._clock() - self._begun_us
         return self.source.live and not self.model.frames and waited_us > _SILENT_US
 
@@ -245,22 +245,22 @@ class Session:
         return self.model.trace.origin_us or 0
 
     def next_stamp(self) -> None:
-        """Write times otherwise from now on: since the first frame, the one before, absolute."""
+        """Use the next format of times: since the first frame, since the previous one, absolute."""
         self.stamp = STAMPS[(STAMPS.index(self.stamp) + 1) % len(STAMPS)]
 
     def next_bus(self, bus: str) -> str:
-        """Return the name of the bus after one, of the first after the last."""
+        """Return the name of the next bus. The first bus follows the last bus."""
         names = list(self.buses) or [""]
         place = names.index(bus) if bus in names else 0
         return names[(place + 1) % len(names)]
 
     def arm(self) -> None:
-        """Let tasks send, if there is a bus."""
+        """Allow tasks to send, if there is a bus."""
         with self.lock:
             self.armed, self.trouble = self.can_send, ""
 
     def disarm(self) -> None:
-        """Stop all tasks; nothing is sent from now on."""
+        """Stop all tasks. Nothing is sent from now on."""
         with self.lock:
             self.armed = False
             for task in self.tasks:
@@ -268,17 +268,17 @@ class Session:
 
     @property
     def started(self) -> bool:
-        """Whether its thread reads."""
+        """Whether the thread is reading."""
         return self._thread is not None
 
     def over(self, model: Model) -> Session:
-        """Return another session on this source, once this one is closed."""
+        """Return another session on the same source, after this session is closed."""
         session = Session(self.source, model, self.buses, self._clock)
         session.words = self.words
         return session
 
     def resume(self, source: AnySource[AnyRecord], buses: Mapping[str, _Send]) -> None:
-        """Go on after `close`, on a source that was opened again."""
+        """Continue after `close` with a source that was opened again."""
         self.source, self.buses = source, dict(buses)
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
         if self.started:
@@ -290,22 +290,22 @@ class Session:
             self._take(records)
 
     def start(self) -> None:
-        """Begin to read, in a thread of its own."""
+        """Start to read in a separate thread."""
         self._thread = self._pool.submit(self._run)
 
     def check(self) -> None:
-        """Raise what ended the thread, if anything did."""
+        """Raise the error that ended the thread, if there was one."""
         if self._thread is not None and self._thread.done():
             self._thread.result()
 
     def close(self) -> None:
-        """End the thread, and stop sending; the source stays open for the final report."""
+        """End the thread, and stop sending. The source stays open for the final report."""
         self.armed = False  # else a slow bus would take all that is due first
         self._stop.set()
         self._pool.shutdown()
 
     def step(self, timeout_us: int = 0) -> None:
-        """Wait for a first frame or a task that is due, and take all that is there."""
+        """Wait for a first frame or a due task. Process all frames that have arrived."""
         due_us = min((task.due_us for task in self.tasks), default=NEVER)
         records = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
         with self.lock:
@@ -357,7 +357,10 @@ class Session:
         self._echo.append(Record(self._source_us(), name, frame, sent=True))
 
     def _source_us(self) -> int:
-        """Return the time at the source: that of this machine until a frame has a time."""
+        """Return the time at the source.
+
+        Until a frame has a time, it is the time of this machine.
+        """
         return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
 
 
@@ -365,11 +368,11 @@ _TERMINAL: Final = "/dev/tty"
 
 
 def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Session:
-    """Open the source that SOURCE words name; nothing is sent until the session is armed.
+    """Open the source that SOURCE words name. Nothing is sent until the session is armed.
 
     Raises:
-        Refused: words that do not name a source, or sources that cannot be combined.
-        SourceFailed: a bus or file that cannot be opened.
+        Refused: the words do not name a source, or the sources cannot be combined.
+        SourceFailed: a bus or file cannot be opened.
     """
     parsed = [parse_source(word) for word in words]
     buses = [word for word in parsed if isinstance(word, BusSpec)]
@@ -395,12 +398,12 @@ def empty_session(model: Model) -> Session:
 
 
 def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
-    """Send on a bus as it was opened last."""
+    """Send a frame on a bus that may have been opened again."""
     bus_source.send_on(bus.bus, bus.name, frame)
 
 
 def _take_pipe() -> int:
-    """Let the keys come from the terminal; return where the pipe is now."""
+    """Read the keys from the terminal. Return the new file descriptor of the pipe."""
     try:
         terminal = os.open(_TERMINAL, os.O_RDWR)
     except OSError as error:

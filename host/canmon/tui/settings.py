@@ -1,4 +1,4 @@
-"""The screen of settings: buses, files, filter and alarms, changed while the monitor runs.
+"""The settings screen for buses, files, filter and alarms, which can change while the monitor runs.
 
 >>> parse_settings({**EMPTY, "source": "can0 can1", "bitrate": "500k"}).setup.source
 ('can0', 'can1')
@@ -58,23 +58,23 @@ _LINES: Final = {
     "dbc": ("DBC files", "as car.dbc"),
     "filter": ("trace filter", "as node=3 and (pdo or emcy)"),
 }
-"""Fields of a line: what stands before them, and what in an empty one."""
+"""Fields of one line, with the label and the text in an empty field."""
 
 _AREAS: Final = {"eds": ("EDS of nodes", 3), "rules": ("alarms", 6)}
-"""Fields of several lines: what stands before them, and how many are shown."""
+"""Fields of several lines, with the label and the number of visible lines."""
 
 _ORDER: Final = (*list(_LINES)[:6], "eds", *list(_LINES)[6:], "rules")
 EMPTY: Final = dict.fromkeys(_ORDER, "")
-"""Texts of all fields, each empty."""
+"""Texts of all fields, which are empty."""
 
 _PATHS: Final = ("source", "eds_dir", "dbc")
 
 
 class InputError(ValueError):
-    """What is wrong with a field.
+    """An invalid field.
 
     Attributes:
-        field: its name.
+        field: name of the field.
     """
 
     def __init__(self, field: str, reason: str) -> None:
@@ -84,12 +84,12 @@ class InputError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MonitorSettings:
-    """What the screen sets.
+    """The settings that the screen can change.
 
     Attributes:
-        setup: buses and files.
-        filter: of the trace.
-        rules: of the alarms, as TOML.
+        setup: buses and files of the monitor.
+        filter: filter of the trace.
+        rules: rules of the alarms as TOML.
     """
 
     setup: MonitorSetup
@@ -99,7 +99,7 @@ class MonitorSettings:
 
 @contextmanager
 def of_field(name: str) -> Iterator[None]:
-    """Report errors of the block for a field."""
+    """Report errors in the block as errors of a field."""
     try:
         yield
     except InputError:
@@ -139,7 +139,7 @@ def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None)
 
     Args:
         texts: texts of all fields.
-        before: the present settings; options that have no field are kept.
+        before: present settings. Options that have no field are kept.
 
     Raises:
         InputError: a field is invalid.
@@ -194,10 +194,13 @@ def _bit_rate(name: str, text: str) -> int | None:
 
 
 class _FileSuggester(Suggester):
-    """Completes the last word of a field as a file name; right takes it."""
+    """Suggester that completes the last word of a field as a file name.
+
+    The right key accepts it.
+    """
 
     async def get_suggestion(self, value: str) -> str | None:
-        """Return the field with the first file that begins so."""
+        """Return the text of the field with the first file name that has this beginning."""
         begun = value.rpartition(" ")[2]
         found = list(islice(iglob(f"{escape(begun)}*"), 100)) if begun else []
         return f"{value}{min(found)[len(begun) :]}" if found else None
@@ -208,7 +211,8 @@ class SettingsScreen(ModalScreen[None]):
 
     Args:
         settings: the present settings.
-        apply: called with the entered settings; raises InputError if they cannot be used.
+        apply: function that is called with the entered settings. It raises InputError if they
+            cannot be used.
     """
 
     HELP = """
@@ -273,7 +277,7 @@ the name that is proposed.
         )
 
     def on_mount(self) -> None:
-        """Begin with the bus."""
+        """Set the focus to the bus."""
         self.query_one("#field-source").focus()
 
     def on_input_submitted(self) -> None:
@@ -281,7 +285,7 @@ the name that is proposed.
         self.action_apply()
 
     def action_apply(self) -> None:
-        """Apply all fields, or say what is wrong with one."""
+        """Apply all fields, or show the error of a field."""
         for one in self.query(".wrong"):
             one.display = False
         try:
@@ -292,7 +296,7 @@ the name that is proposed.
         self.dismiss()
 
     def action_leave(self) -> None:
-        """Leave everything as it is."""
+        """Leave the screen without a change."""
         self.dismiss()
 
     def _read(self) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The verb `check`: rules against traffic."""
+"""The verb `check`, which checks rules against traffic."""
 
 from __future__ import annotations
 
@@ -64,19 +64,19 @@ else:  # numpy; decoders
 
 
 class _FindingPrinter:
-    """Findings, shown as they occur.
+    """Printer that shows findings as they occur.
 
     Args:
         jsonl: whether to show the findings as JSON.
-        stamp: format of times in text; None for seconds since the epoch.
+        stamp: format of times in text, or None for seconds since the epoch.
         kept: whether to keep the findings for a report.
-        rules: the names of all rules.
+        rules: names of all rules.
 
     Attributes:
-        counts: number of findings, by rule.
+        counts: number of findings by rule.
         findings: all findings, if `kept`.
         frames: number of checked frames.
-        unjudged: what the rules could not judge, known at the end.
+        unjudged: rules that could not be judged, known at the end.
     """
 
     unjudged = Unjudged({})
@@ -93,10 +93,10 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count frames; displayed times may begin at the first of all frames.
+        """Count frames. Displayed times may begin at the first of all frames.
 
         Args:
-            frames: at least one.
+            frames: frames to count. There is at least one frame.
             first_us: time of the first of these frames.
         """
         if self._lines is not None and not self.frames:
@@ -104,7 +104,7 @@ class _FindingPrinter:
         self.frames += frames
 
     def begin_again(self) -> None:
-        """Forget all but how many findings were shown: those come first again, and are not."""
+        """Restart the check. Findings that were already shown occur first, and are not repeated."""
         self._shown = self.counts.total()
         self.counts.clear()
         self.findings.clear()
@@ -121,7 +121,7 @@ class _FindingPrinter:
                 click.echo("\n".join(map(self._text, new)))
 
     def nothing_judged(self) -> str:
-        """Return why no rule judged anything; empty if one did."""
+        """Return why no rule judged anything, empty if a rule did."""
         none = self.none_judged
         if any(name not in none for name in self._rules):
             return ""
@@ -129,18 +129,21 @@ class _FindingPrinter:
 
     @property
     def none_judged(self) -> dict[str, str]:
-        """Why rules judged nothing, by their names; one that found something did."""
+        """Reasons why rules judged nothing, by name of the rule.
+
+        A rule with a finding has judged.
+        """
         return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
 
     def doubts(self) -> list[str]:
-        """Report what was judged and what was not, one line each."""
+        """Report what was judged and what was not judged, with one line each."""
         held = [name for name in self._rules if name not in self.none_judged]
         none = [f"judged: {', '.join(held)}"] * bool(held)
         none += [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
         return none + [f"not judged: {text}" for text in self.unjudged.notes]
 
     def summary(self) -> str:
-        """Report how it ended."""
+        """Report the result."""
         if self.counts:
             counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
             return f"{counted(self.counts.total(), 'finding')}: {counts}"
@@ -151,7 +154,7 @@ class _FindingPrinter:
 
 
 def finding_json(finding: TrafficFinding) -> str:
-    """Write a finding as an object; frames as candump does."""
+    """Return a finding as an object. Frames are in candump notation."""
     said: dict[str, object] = {
         "v": 1,
         "t": finding.at_us / 1e6,
@@ -205,14 +208,14 @@ _rule_options: Final[Decorator] = add_options(
         help="As 'node 3 operational within 2s', 'emcy never'; or NAME of an installed package.",
     ),
 )
-"""Add a rule each as an option."""
+"""Decorator that adds each rule as an option."""
 
 
 def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
-    """Return the rules of files and options together.
+    """Return the combined rules of files and options.
 
     Raises:
-        Refused: an invalid rule, a file that cannot be read or has no rule.
+        Refused: a rule is invalid, or a file cannot be read or has no rule.
     """
     words: RuleValues = {}
     for path in files:
@@ -230,7 +233,7 @@ def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
 def _read_learnt(
     files: Sequence[Path], options: Mapping[str, object], *, init: bool
 ) -> learnt.Learnt | None:
-    """Return the rules learnt from a good log; None if the files have other rules.
+    """Return the rules learnt from a good log, or None if the files have other rules.
 
     Raises:
         Refused: the file of learnt rules is invalid, or is not the only file.
@@ -266,7 +269,7 @@ def _is_empty(rules: Rules) -> bool:
 
 
 def _file(path: Path) -> RuleValues:
-    """Read a file, and check it alone so that it is named if it is wrong."""
+    """Read a file. Check it separately, so that the message names the file."""
     try:
         return parse_rule_file(path.read_text("utf-8"), load_rule)
     except OSError as error:
@@ -276,7 +279,7 @@ def _file(path: Path) -> RuleValues:
 
 
 _BROKEN: Final = 1
-"""Exit status where a rule does not hold."""
+"""Exit status if a rule is broken."""
 
 _RULE_FILE: Final = ".toml"
 _STDIN: Final = "-"
@@ -419,20 +422,20 @@ def command(  # noqa: PLR0913 - options
 # What is wrong without a rule.
 
 _MOST_FRAMES: Final = 20_000_000
-"""Frames of a bus that are kept: 700 MB."""
+"""Number of frames of a bus that are kept, which take 700 MB."""
 _SHOWN: Final = 20
 _SHOWN_FRAMES: Final = 3
-"""Default number of findings, and of frames of each, that are shown."""
+"""Default number of findings, and of frames per finding, that are shown."""
 
 
 class _Usual:
-    """Compares frames with what is usual.
+    """A comparison of frames with the usual traffic.
 
     Args:
         words: SOURCE words.
         bus: options of buses.
-        make: makes the object that judges the frames.
-        cut: the part of a log to read.
+        make: function that makes the object that judges the frames.
+        cut: part of a log to read.
         reopen: whether to wait for a bus that goes away.
 
     Attributes:
@@ -478,7 +481,7 @@ class _Usual:
             self._diagnoser.take(records)
 
     def show(self, *, jsonl: bool, stamp: Stamp | None, most: int | None) -> None:
-        """Show what was found."""
+        """Show the findings."""
         source = self.source
         lost = [f"{source.lost} frames were lost"] if source.lost else []
         self._diagnoser.without_errors = source.without_errors
@@ -499,7 +502,7 @@ class _Usual:
         )
 
     def learn(self, output: Path | None) -> None:
-        """Write what is usual as rules."""
+        """Write the usual traffic as rules."""
         frames, words = self._diagnoser.kept.frames, " ".join(self._words)
         if not frames:
             raise _NothingJudged(_no_frame(self.source, self._words).replace("judged", "learnt"))
@@ -521,7 +524,7 @@ class _Usual:
                 click.echo(f"{bus.name}: taken for usual: {found}", err=True)
 
     def write(self, junit_path: Path | None, sarif_path: Path | None) -> None:
-        """Write reports."""
+        """Write the reports."""
         found = self._found
         findings = [
             TrafficFinding(fault.first_us, fault.rule, str(fault).partition(": ")[2])
@@ -537,7 +540,7 @@ class _Usual:
         return "" if self._found.frames else _no_frame(self.source, self._words)
 
     def end(self, strict: bool) -> None:
-        """Report what was judged, and end with the exit status."""
+        """Report what was judged. End with the exit status."""
         found, nothing = self._found, self._nothing()
         said = [*self._said, f"judged: {', '.join(found.judged)}"]
         by_reason: dict[str, list[str]] = {}
@@ -555,7 +558,7 @@ class _Usual:
 
 
 def _fault_text(fault: diagnosis.BusFault, lines: DumpLines | None, most: int) -> str:
-    """Write a finding: a line with its time, and one with its frames."""
+    """Return a finding as text, with a line for the time and a line for the frames."""
 
     def time(at_us: int) -> str:
         return lines.stamp(at_us).strip() if lines else f"({seconds_text(at_us, 1)})"
@@ -569,7 +572,7 @@ def _fault_text(fault: diagnosis.BusFault, lines: DumpLines | None, most: int) -
 
 
 def _fault_json(fault: diagnosis.BusFault) -> str:
-    """Write a finding as an object."""
+    """Return a finding as an object."""
     return json_text(
         {
             "v": 1,
@@ -588,11 +591,11 @@ def _fault_json(fault: diagnosis.BusFault) -> str:
 
 
 _SHOWN_BY: Final = ("around", "most", "report_path", "sarif_path", "jsonl", "stamp")
-"""Options of how findings are shown."""
+"""Options for displaying findings."""
 
 
 def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
-    """Refuse options that would do nothing."""
+    """Raise Refused for options without an effect."""
     if init:
         refuse_idle("--init shows no finding", *_SHOWN_BY)
     else:
@@ -606,7 +609,10 @@ def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
 
 
 class _NothingJudged(click.ClickException):
-    """One line on standard error, and exit status 5."""
+    """No rule judged anything.
+
+    The error prints one line on standard error, with exit status 5.
+    """
 
     exit_code = 5
 
@@ -618,7 +624,7 @@ def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
 
 
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
-    """Return the bit rate; Refused if a rule needs it and it is not given."""
+    """Return the bit rate. Raise Refused if a rule needs it and it is missing."""
     bit_rate = listening.bit_rate_of(words, bus)
     with refusing():
         rules.load(bit_rate)
@@ -631,7 +637,7 @@ def _in_blocks(
     verdict: _FindingPrinter,
     span_us: int | None,
 ) -> BlockLog | None:
-    """Judge a log; return None where it is to be read again, frame by frame."""
+    """Judge a log. Return None if the log must be read again, frame by frame."""
 
     def take(block: Columns) -> None:
         if len(block):
@@ -676,7 +682,7 @@ _Judged = tuple[str, list[str], list[TrafficFinding], str, Mapping[str, str]]
 
 
 def _write(option: str, path: Path | None, text: Callable[..., str], judged: _Judged) -> None:
-    """Write a report where one is wanted."""
+    """Write a report if an option requests it."""
     if path is None:
         return
     with refusing(option):

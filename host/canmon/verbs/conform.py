@@ -1,4 +1,4 @@
-"""The verb `conform`: judge one CANopen node, clause by clause."""
+"""The verb `conform`, which judges one CANopen node, clause by clause."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ else:  # slow
 
 
 _LEVELS: Final = ("read-only", "communication", "intrusive")
-"""In the order of `Level`."""
+"""Names of the levels in the order of `Level`."""
 
 
 _LEAST_LOAD: Final = 1
-"""In percent: with less an answer takes longer than a check may."""
+"""Smallest load in percent. With a smaller load, an answer takes longer than a check may."""
 
 
 class _Percent(click.FloatRange):
-    """A share in percent; `nan`, which is in no range, is refused too."""
+    """A share in percent. `nan`, which is in no range, is refused too."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -158,7 +158,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
 
 
 def _level(options: dict[str, Any]) -> str:
-    """Return the level that was chosen; two are refused: who only reads would write."""
+    """Return the chosen level. Two levels are refused, because the user may want only to read."""
     given = [level for level in _LEVELS if options.pop(level.replace("-", "_"))]
     if len(given) > 1:
         words = " and ".join(f"--{level}" for level in given)

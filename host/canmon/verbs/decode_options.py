@@ -1,4 +1,4 @@
-"""The options of verbs that decode: EDS, DBC and filter.
+"""The options of verbs that decode frames: EDS, DBC and filter.
 
 The decoder is imported only when a verb needs it, so that other verbs start faster.
 """
@@ -35,11 +35,11 @@ else:  # slow
 
 
 class EdsOptions(NamedTuple):
-    """What `--eds` and `--eds-dir` give.
+    """The values of `--eds` and `--eds-dir`.
 
     Attributes:
-        words: NODE=FILE.
-        folders: in which files of other nodes are looked for.
+        words: words of the form NODE=FILE.
+        folders: folders in which the files of other nodes are searched.
     """
 
     words: tuple[str, ...] = ()
@@ -51,11 +51,11 @@ class EdsOptions(NamedTuple):
 
 _NO_EDS: Final = EdsOptions()
 _PAINTED: Final = ("graph", "nodes", "top")
-"""Verbs that paint a screen on a terminal."""
+"""Verbs that show a screen on a terminal."""
 
 
 def eds_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--eds` and `--eds-dir`, together as `eds`; `read_eds_files` takes it."""
+    """Add `--eds` and `--eds-dir`, together as `eds`. `read_eds_files` uses this value."""
     add = click.option(
         "--eds",
         multiple=True,
@@ -76,7 +76,7 @@ _dbc_option: Final = click.option(
     "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."
 )
 decode_options: Final = add_options(eds_option, _dbc_option)
-"""Add `--eds` and `--dbc`; `make_decoder` takes what they give."""
+"""Decorator that adds `--eds` and `--dbc`. `make_decoder` uses their values."""
 
 filter_option: Final = click.option(
     "-F",
@@ -86,11 +86,11 @@ filter_option: Final = click.option(
     help="Only these: 'node=3 and (pdo or emcy)', 181-18F, 123:7FF,#FF, 'sdo[6040h]',"
     " 'statusword.fault'.",
 )
-"""Add `-F`, as `wanted`; `read_filter` takes what it gives."""
+"""Decorator that adds `-F` as `wanted`. `read_filter` uses its value."""
 
 
 def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
-    """Read the files of `--eds`; Refused if a node, file or folder is missing or invalid.
+    """Read the files of `--eds`. Raise Refused if a node, file or folder is missing or invalid.
 
     Files of a folder are chosen when a node sends its identity, and each choice is reported.
     """
@@ -100,7 +100,7 @@ def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
 
 
 def _say_beside_pictures(text: str) -> None:
-    """Print a message on standard error; if the verb paints a screen, after that."""
+    """Print a message on standard error. If the verb shows a screen, print it after the screen."""
     context = click.get_current_context(silent=True)
     if context is not None and context.info_name in _PAINTED and sys.stdout.isatty():
         context.call_on_close(functools.partial(say, text))
@@ -109,25 +109,25 @@ def _say_beside_pictures(text: str) -> None:
 
 
 def make_decoder(eds: EdsOptions = _NO_EDS, dbc: Sequence[Path] = ()) -> Decoder:
-    """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
+    """Make a decoder from the files of `--eds` and `--dbc`. Raise Refused if a file is invalid."""
     return decoder_of(read_eds_files(eds), dbc)
 
 
 def decoder_of(objects: Mapping[int, node_memory.EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
-    """Make a decoder of what `--eds` names and was read, and of what `--dbc` names."""
+    """Make a decoder from the EDS files that were read, and from the files of `--dbc`."""
     with refusing_dbc():
         return extensions.make_decoder(objects, dbc)
 
 
 @contextmanager
 def refusing_dbc() -> Iterator[None]:
-    """Refuse, as `--dbc` does, files that are no DBC."""
+    """Raise Refused for files that are not DBC files, as `--dbc` does."""
     with refusing("--dbc", dbc_file.DbcError):
         yield
 
 
 def read_filter(text: str | None) -> filters.Filter | None:
-    """Read what `-F` says; Refused with the column if it is no filter."""
+    """Read the filter of `-F`. Raise Refused with the column if it is not a filter."""
     if text is None:
         return None
     with refusing("", filters.FilterError):
@@ -143,7 +143,7 @@ SOURCE   can0                      a bus of SocketCAN, or of the interface that 
          serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
          run.log run.blf run.asc.gz  logs: candump, jsonl, asc, blf, trc, csv, mf4, pcapng, trace
          -                         standard input: what candump or canmon dump prints"""
-"""For the help text of a verb that takes SOURCE words."""
+"""Part of the help text of a verb that takes SOURCE words."""
 
 strict_option: Final[Decorator] = click.option(
     "--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."
@@ -172,7 +172,7 @@ def cut_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def log_time_option(option: str, name: str, **attributes: Any) -> Decorator:
-    """Return the option of a moment of a log; `parse_log_time` says how it is written."""
+    """Return the option for a moment of a log. `parse_log_time` defines the notation."""
 
     def parsed(
         context: click.Context, parameter: click.Parameter, text: str | None
@@ -187,7 +187,7 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
     """Return a decorator that makes a verb with SOURCE words, `--strict` and the bus options.
 
     Args:
-        options: further options of the verb, in the order of its help.
+        options: further options of the verb, in the order of the help.
     """
     source = click.argument("source", nargs=-1)
     add = add_options(source, *options, strict_option, bus_options, fd_options)
@@ -204,7 +204,7 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
 
 
 def refuse_idle_of_bus(source: Sequence[str]) -> None:
-    """Refuse options that open a bus where SOURCE words name none."""
+    """Raise Refused for options that open a bus if SOURCE words do not name a bus."""
     words = [word for word in source if not word.endswith(".toml")]
     parsed = [parse_source(word) for word in words]
     if not parsed:
@@ -219,6 +219,6 @@ _OPENS: Final = ("interface", "channel", "timing", "bus_kwargs", "fd")
 
 
 def explained(command: click.Command) -> click.Command:
-    """Put what a SOURCE may be in the place of `{source}` in a command's help."""
+    """Replace `{source}` in a command's help by a description of SOURCE."""
     command.help = cleandoc(command.help or "").replace("{source}", _SOURCE_HELP)
     return command

@@ -1,4 +1,4 @@
-"""The verb `dump`: frames as they come, one line each."""
+"""The verb `dump`, which prints arriving frames, one per line."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ _STDIN: Final = 0
 
 
 class _TriggerKeys:
-    """Waits for Enter on standard input, if it is a terminal, and for SIGUSR1.
+    """A wait for Enter on standard input, if it is a terminal, and for SIGUSR1.
 
     Args:
-        typed: whether to wait for Enter; not if standard input is recorded.
+        typed: whether to wait for Enter. It is False if standard input is recorded.
     """
 
     def __init__(self, typed: bool) -> None:
@@ -83,7 +83,7 @@ class _TriggerKeys:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Take signals while the block runs."""
+        """Receive signals while the block runs."""
         if sys.platform == "win32":
             yield
         else:  # mypy leaves out the branch of the other system
@@ -97,7 +97,7 @@ class _TriggerKeys:
                 signal.signal(signal.SIGTTIN, ignored)
 
     def pressed(self) -> str:
-        """Return what was pressed since the last time; empty if nothing was."""
+        """Return what was pressed since the last call, empty if nothing was pressed."""
         if self._signals:
             self._signals = 0
             return "SIGUSR1"
@@ -117,7 +117,10 @@ class _TriggerKeys:
 _POLL_US: Final = 100_000
 
 _Take = Callable[[list[printer.DecodedFrame], int, "Sequence[Mark]"], bool]
-"""Takes frames, how many were lost so far, and what happened behind them; says when to end."""
+"""Function that takes frames, the number of lost frames, and later events.
+
+It returns whether to end.
+"""
 
 _shown: Final = add_options(
     click.option(
@@ -253,7 +256,7 @@ _DECODES: Final = ("eds", "eds_folders", "dbc")
 def _refuse_idle(
     source: Sequence[str], output: str | None, file: Path | None, *, raw: bool, filtered: bool
 ) -> None:
-    """Refuse options that would do nothing."""
+    """Raise Refused for options without an effect."""
     if file is not None:
         refuse_idle("-l shows nothing", *_TEXT_ONLY, "errors", "raw")
     elif output:
@@ -273,7 +276,7 @@ def _pass_pieces(
     writer: printer.StdoutWriter,
     blocks: printer.BlockPrinter,
 ) -> None:
-    """Print a large log, of which all frames are wanted."""
+    """Print a large log whose frames are all wanted."""
     with closing(log), until_interrupted(), until_unread():
         for piece in log.pieces():
             if isinstance(piece, Sequence):
@@ -285,7 +288,7 @@ def _pass_pieces(
 
 
 def _with_keys(log: LogFile, keys: _TriggerKeys) -> _Take:
-    """Return what takes frames and looks for keys."""
+    """Return a function that takes frames and checks for keys."""
 
     def take(decoded_frames: list[printer.DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:
         ended = log.take(decoded_frames, lost, marks)
@@ -307,7 +310,7 @@ def _pass_on(
     count: int | None = None,
     quiet_ms: int | None = None,
 ) -> None:
-    """Pass frames on until the source ends, `count` of them came, or none for `quiet_ms`."""
+    """Pass on frames until the source ends, `count` frames came, or none came for `quiet_ms`."""
     quiet_s = quiet_ms / 1e3 if quiet_ms else float("inf")
     latest_s, left = time.monotonic(), count
     while not source.ended and left != 0:
@@ -387,7 +390,7 @@ def _convert_pieces(
     take: Callable[[list[DecodedFrame], int, Sequence[Mark]], bool],
     take_block: Callable[[TextBlock], bool],
 ) -> None:
-    """Pass a large log on, of which all frames are wanted."""
+    """Convert a large log whose frames are all wanted."""
     for piece in log.pieces():
         if isinstance(piece, Sequence):
             take([(record, None) for record in piece], log.lost, log.marks)

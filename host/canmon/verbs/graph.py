@@ -1,4 +1,4 @@
-"""The verb `graph`: curves of signals, in the terminal and in files."""
+"""The verb `graph`, which draws curves of signals in the terminal and in files."""
 
 from __future__ import annotations
 
@@ -76,13 +76,13 @@ class _GraphRequest:
 
     Attributes:
         files: files to write.
-        begin: beginning of the view, None for all.
-        end: end of the view, None for all.
-        at: the time of the cursor, None for none.
+        begin: begin of the view, or None for all.
+        end: end of the view, or None for all.
+        at: time of the cursor, or None for none.
         ranges: ranges of axes.
         size: size of a picture in pixels.
         window_us: length of the window of a bus.
-        span_us: time to listen to a bus; None if not given.
+        span_us: time to listen to a bus, or None if no time is given.
         title: title of a picture.
     """
 
@@ -97,10 +97,10 @@ class _GraphRequest:
     title: str
 
     def view(self, series: Sequence[Series], first_us: int | None) -> View:
-        """Return the view; Refused if it is invalid.
+        """Return the view. Raise Refused if it is invalid.
 
         Args:
-            series: the curves.
+            series: samples of the curves.
             first_us: time of the first frame, from which times count.
         """
         whole = View.of(series)
@@ -144,10 +144,10 @@ def _range(text: str) -> tuple[int, tuple[float, float]]:
 
 
 _MOST: Final = 2_000_000
-"""Samples of a signal that are kept of a bus."""
+"""Number of samples that are kept of a signal of a bus."""
 
 _NO_TERMINAL: Final = (100, 28)
-"""Columns and lines where there is no terminal."""
+"""Columns and lines that are used without a terminal."""
 
 
 @click.command()
@@ -236,7 +236,7 @@ _OF_VIEWS: Final = (*_OF_PICTURES, "files", "begin", "end", "window_us")
 
 
 def _refuse_idle(source: str, request: _GraphRequest, *, listed: bool) -> None:
-    """Refuse options that would do nothing."""
+    """Raise Refused for options without an effect."""
     if listed:
         refuse_idle("without a SIGNAL the signals are listed", *_OF_VIEWS)
     if not request.files:
@@ -248,7 +248,7 @@ def _refuse_idle(source: str, request: _GraphRequest, *, listed: bool) -> None:
 
 
 def _refuse_missing(source: str, collector: Collector) -> None:
-    """Refuse objects that a log does not hold, with the names that could be meant."""
+    """Raise Refused for objects that a log does not hold. The message suggests similar names."""
     for text in collector.missing:
         node, dot, base = text.lower().rpartition(".") if text[:1].isdecimal() else ("", "", text)
         of_node = [f"{node}{dot}{kind}" for kind in BUS_SIGNALS if not dot or kind in OF_NODES]
@@ -285,7 +285,7 @@ def _list(
 
 
 def _tree(survey: Survey) -> Iterator[str]:
-    """Yield the signals as lines: of each node by PDO, then of the bus."""
+    """Yield the signals as lines, for each node by PDO, and then for the bus."""
     span_us = max(1, survey.since(survey.last_us))
     several = len(survey.frames) > 1
     width = max((len(_written(name)) for name in survey.signals), default=0)
@@ -321,7 +321,7 @@ def _written(name: SignalName) -> str:
 
 
 def _values(track: SignalTrack) -> str:
-    """Write the range of a signal, or its states."""
+    """Return the range of a signal, or its states, as text."""
     if track.states is None:
         return f"{track.low:g} .. {track.high:g} {track.unit}".rstrip()
     return ", ".join(dict.fromkeys(state for _, state in track.states.changes))
@@ -338,7 +338,7 @@ _NOTHING_SHOWN: Final = 1
 
 
 def _show(source: str, collector: Collector, request: _GraphRequest) -> bool:
-    """Write the files, else print the picture; return whether any sample is in it."""
+    """Write the files, or else print the picture. Return whether the picture contains a sample."""
     series = collector.series
     for one in series:
         if not one:
@@ -360,7 +360,7 @@ def _show(source: str, collector: Collector, request: _GraphRequest) -> bool:
 
 
 def _missed(series: Sequence[Series], view: View) -> str:
-    """Return that all samples lie outside a view; empty if one is inside, or there are none."""
+    """Return a message if all samples lie outside a view, and an empty text otherwise."""
     whole = View.of(series)
     if not any(series) or (whole.from_us <= view.to_us and view.from_us <= whole.to_us):
         return ""
@@ -372,7 +372,7 @@ def _missed(series: Sequence[Series], view: View) -> str:
 
 
 def _title(source: str, view: View, title: str) -> str:
-    """Return what stands above a picture: what it is, of what, and when its time begins."""
+    """Return the title of a picture, with its content, its source, and the begin of its time."""
     begun = f"0 s is {date_text(view.origin_us)}" if view.origin_us >= DATED_US else ""
     name = Path(source).name if Path(source).is_file() else source
     return ", ".join(filter(None, [one_line(title), one_line(name), begun]))

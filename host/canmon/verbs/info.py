@@ -1,4 +1,4 @@
-"""The verb `info`: what a log is, from its head alone."""
+"""The verb `info`, which describes a log from its head alone."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class _LogHead:
     """The beginning of a log, and its end if that can be found without a scan.
 
     Attributes:
-        kind: its format.
-        compressed: whether it is compressed with gzip.
+        kind: format of the log.
+        compressed: whether the log is compressed with gzip.
         size_bytes: size of the file.
-        frames: number of frames; None if only a scan would find it.
-        head_frames: number of frames read from its beginning.
+        frames: number of frames, or None if only a scan would find it.
+        head_frames: number of frames read from the beginning of the log.
         channels: names of the buses in these frames.
-        first_us: time of the first frame, None if there is none.
-        last_us: time of the last frame; None if only a scan would find it.
-        tally: counts items at the beginning that are not frames.
+        first_us: time of the first frame, or None if there is no frame.
+        last_us: time of the last frame, or None if only a scan would find it.
+        tally: counts of items at the beginning that are not frames.
     """
 
     kind: log_file.LogFormat
@@ -52,12 +52,12 @@ class _LogHead:
 
     @property
     def whole(self) -> bool:
-        """All of the log was read."""
+        """Whether all of the log was read."""
         return self.head_frames < _HEAD_FRAMES
 
     @property
     def end_read(self) -> bool:
-        """The end of the log was read, or all of it."""
+        """Whether the end of the log, or all of it, was read."""
         return self.whole or self.last_us is not None
 
 
@@ -69,9 +69,9 @@ def read_head(path: Path) -> _LogHead:
     """Read the first thousand frames of a log, and the end of a text log.
 
     Raises:
-        LogFormatError: the file's name has no known format.
+        LogFormatError: the name of the file has no known format.
         OSError: the file cannot be read.
-        LogError: the content does not match the file's name.
+        LogError: the content does not match the name of the file.
     """
     kind, compressed = log_file.log_format(path), path.suffix.lower() == log_file.COMPRESSED
     reader = read_log(path)
@@ -96,7 +96,7 @@ def read_head(path: Path) -> _LogHead:
 
 
 def _last_us(path: Path) -> int | None:
-    """Return the time of the last frame of a log in text, if it is near its end."""
+    """Return the time of the last frame of a text log, if it is near the end of the log."""
     with path.open("rb") as file:
         file.seek(-min(_TAIL_BYTES, path.stat().st_size), os.SEEK_END)
         lines = LogLines()

@@ -1,4 +1,4 @@
-"""The verb `nodes`: the state of all nodes."""
+"""The verb `nodes`, which shows the state of all nodes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ else:  # numpy
     column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
 
 _MANY: Final = 1_000
-"""Default lines and columns without a terminal."""
+"""Default number of lines and columns without a terminal."""
 
 
 @source_command(
@@ -93,10 +93,10 @@ class _NodesView:
     """A node board with its decoder and its display.
 
     Args:
-        eds: contents of EDS files, by node-ID; these nodes are on the board from the beginning.
+        eds: content of EDS files by node-ID. These nodes are on the board from the beginning.
 
     Attributes:
-        decoder: decodes the frames for the board.
+        decoder: decoder of the frames for the board.
     """
 
     def __init__(self, eds: dict[int, EdsObjects]) -> None:
@@ -118,12 +118,12 @@ class _NodesView:
         self._watch.take(records)
 
     def lines(self, *, live: bool) -> list[str]:
-        """Return the board for paper, or as wide as the terminal is."""
+        """Return the board for a file, or as wide as the terminal."""
         columns = _columns() if sys.stdout.isatty() else _MANY
         return render_board(self._board, self._now_us(live), columns, _MANY)
 
     def json(self, *, live: bool) -> list[str]:
-        """Return the board as JSON, an object a node."""
+        """Return the board as JSON, with one object per node."""
         return board_json(self._board, self._now_us(live))
 
     def painted(self, now_us: int, width: int, height: int) -> list[str]:
@@ -131,7 +131,7 @@ class _NodesView:
         return render_board(self._board, now_us, width, height)
 
     def _now_us(self, live: bool) -> int:
-        """Return the time at a live source, of a file its last frame's."""
+        """Return the time at a live source, or the time of the last frame of a file."""
         return self._watch.now_us if live else self._board.now_us
 
 

@@ -1,4 +1,4 @@
-"""The verb `play`: a log, sent again."""
+"""The verb `play`, which sends the frames of a log again."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ else:  # python-can is slow
 # What of a log is sent where and when.
 
 _FOREVER: Final = 0
-"""As `loops`."""
+"""Value of `loops` for a replay without an end."""
 
 _LEAST_LOOP_US: Final = 1_000
 
@@ -46,9 +46,9 @@ class _Due(NamedTuple):
     """A frame to send.
 
     Attributes:
-        at_us: time of sending, from the start of the replay.
+        at_us: time of sending since the start of the replay.
         channel: bus to send on.
-        frame: the frame.
+        frame: frame to send.
     """
 
     at_us: int
@@ -58,23 +58,26 @@ class _Due(NamedTuple):
 
 @dataclass(slots=True)
 class ReplayPlan:
-    """Frames of a log in the order of the log; their times never go back.
+    """Frames of a log in the order of the log. Their times never go back.
 
     Args:
-        log: the frames; read again for each loop.
-        route: returns the bus on which to send the frames of a bus of the log; None to omit them.
-        speed: factor of the speed; 0 for no pauses.
-        from_us: beginning of the span to send, from the first frame.
-        to_us: end of this span, from the first frame; None for the end of the log.
-        loops: number of loops; `_FOREVER` to repeat until the replay is stopped. A loop begins
-            where the previous one ends: at `to_us`, or else with the last frame. It begins at least
-            1 ms after the beginning of the previous one.
+        log: frames of the log, which are read again for each loop.
+        route: function that returns the bus on which to send the frames of a recorded bus, or None
+            to omit them.
+        speed: factor of the speed, or 0 for no pauses.
+        from_us: begin of the span to send, counted from the first frame.
+        to_us: end of the span to send, counted from the first frame, or None for the end of the
+            log.
+        loops: number of loops, or `_FOREVER` to repeat until the replay is stopped. A loop begins
+            where the previous loop ends, which is at `to_us`, or else at the last frame. It begins
+            at least 1 ms after the begin of the previous loop.
 
     Attributes:
-        left_out: number of frames of other buses, and of error frames, in the span.
+        left_out: number of omitted frames in the span, which are error frames and frames of other
+            buses.
 
     Raises:
-        ValueError: a span that is empty, or a speed below 0.
+        ValueError: the span is empty, or the speed is below 0.
     """
 
     log: Iterable[Record]
@@ -93,7 +96,7 @@ class ReplayPlan:
             raise ValueError(f"from {self.from_us} us to {self.to_us} us there is nothing")
 
     def __iter__(self) -> Iterator[_Due]:
-        """Yield the frames; a log without any ends also an endless replay."""
+        """Yield the frames. A log without any frame ends also an endless replay."""
         begin_us, loop = 0, 0
         while self.loops == _FOREVER or loop < self.loops:
             end_us, sent = begin_us, False
@@ -112,7 +115,7 @@ class ReplayPlan:
             begin_us = max(end_us, begin_us + _LEAST_LOOP_US)
 
     def _span(self) -> Iterator[tuple[int, Record]]:
-        """Yield what is in the span, with its time after the beginning of the span."""
+        """Yield the frames in the span, with their times after the begin of the span."""
         first_us: int | None = None
         latest_us = 0
         for record in self.log:
@@ -135,8 +138,8 @@ class Lateness:
 
     Attributes:
         count: number of delays.
-        max_us: the longest delay.
-        last_us: the latest delay; at the end of a replay, this is its drift.
+        max_us: longest delay.
+        last_us: latest delay. At the end of a replay, it is the drift of the replay.
     """
 
     def __init__(self) -> None:
@@ -145,7 +148,7 @@ class Lateness:
         self.count = self.max_us = self.last_us = 0
 
     def add(self, late_us: int) -> None:
-        """Count one; what is early counts as on time."""
+        """Count a delay. An early frame counts as on time."""
         self.last_us = late_us = max(0, late_us)
         self.count += 1
         self.max_us = max(self.max_us, late_us)
@@ -155,7 +158,7 @@ class Lateness:
             self._above[bucket_of(late_us)] += 1
 
     def percentile_us(self, percent: float) -> int:
-        """Return the delay that a percentage, 0 to 100, does not exceed; 0 if none were counted."""
+        """Return the delay that a percentage, 0 to 100, does not exceed, or 0 without delays."""
         left = self.count * percent / 100
         for late_us, count in self._counts():
             left -= count
@@ -164,13 +167,13 @@ class Lateness:
         return self.max_us
 
     def _counts(self) -> Iterator[tuple[int, int]]:
-        """Give each lateness, the least first, and how many there are."""
+        """Yield each delay in ascending order, with its number."""
         yield from enumerate(self._exact)
         for bucket in sorted(self._above):
             yield middle_us(bucket), self._above[bucket]
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the statistics in words."""
         p50, p99 = self.percentile_us(50), self.percentile_us(99)
         return f"late p50 {p50} us, p99 {p99} us, max {self.max_us} us; last {self.last_us} us"
 
@@ -181,7 +184,7 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 
 
 def _log_path(word: str) -> Path:
-    """Return the log file that a word names; Refused if it names none."""
+    """Return the log file that a word names. Raise Refused if it does not name one."""
     parsed = parse_source(word)
     if not isinstance(parsed, FileSpec):
         raise Refused(f"{word!r} is no log file")
@@ -232,7 +235,7 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
 def _routes(
     words: Sequence[str], channel: str | None
 ) -> tuple[list[str | None], Callable[[str], str | None]]:
-    """Return the buses to open, and where what was recorded goes; None is the bus of -c."""
+    """Return the buses to open, and the bus for each recorded bus. None is the bus of -c."""
     if channel is not None:
         if words:
             raise Refused(f"-c {channel} names the bus: leave out {' '.join(words)}, or -c")
@@ -273,7 +276,7 @@ def _plan(
 
 
 def _first_us(log: LogReader) -> int:
-    """Return when the first frame came; SourceFailed if the log cannot be read."""
+    """Return the time of the first frame. Raise SourceFailed if the log cannot be read."""
     with _failing():
         return next((record.at_us for record in log), 0)
 
@@ -297,7 +300,7 @@ def _loops(text: str) -> int:
 
 
 def _can_id(text: str | None) -> CanFrame | None:
-    """Return a frame with the awaited CAN-ID."""
+    """Return a frame with the expected CAN-ID."""
     if text is None:
         return None
     with refusing("--wait-rx", WireError):
@@ -312,7 +315,7 @@ def _play(
     step: bool,
     wait_rx: CanFrame | None,
 ) -> bool:
-    """Send what is planned; return False if nothing was in the log to be sent."""
+    """Send the planned frames. Return False if the log contained nothing to send."""
     late, pace = Lateness(), Pace()
     with until_interrupted() as signals, until_unread():
         if wait_rx is not None:
@@ -332,14 +335,14 @@ def _play(
 
 
 def _due(plan: ReplayPlan) -> Iterator[_Due]:
-    """Yield what is planned; SourceFailed if the log cannot be read."""
+    """Yield the planned frames. Raise SourceFailed if the log cannot be read."""
     with _failing():
         yield from plan
 
 
 @contextmanager
 def _failing() -> Iterator[None]:
-    """Raise SourceFailed where the block cannot read a log."""
+    """Raise SourceFailed if the block cannot read a log."""
     try:
         yield
     except OSError as error:
@@ -349,7 +352,7 @@ def _failing() -> Iterator[None]:
 
 
 def _wait_for(wanted: CanFrame, buses: Sequence[bus_source.Transmitter]) -> None:
-    """Return when one of the buses carried a frame with this CAN-ID."""
+    """Wait until one of the buses carries a frame with this CAN-ID."""
     while True:
         for bus in buses:
             for _, _, frame, _ in bus.poll(_POLL_US // len(buses)):
@@ -362,7 +365,7 @@ def _same_id(one: CanFrame, other: CanFrame) -> bool:
 
 
 def _confirm(what: str) -> None:
-    """Show what comes next, and wait for Enter; the end of the input ends the replay."""
+    """Show the next frame, and wait for Enter. The end of the input ends the replay."""
     click.echo(what)
     if not sys.stdin.readline():
         raise KeyboardInterrupt

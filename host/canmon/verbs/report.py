@@ -1,4 +1,4 @@
-"""The verb `report`: what was on a bus, as one page."""
+"""The verb `report`, which shows the traffic of a bus as one page."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ else:  # numpy
 
 _RULE_FILE: Final = ".toml"
 _MOST_AROUND: Final = 200
-"""Findings that are shown with their frames."""
+"""Number of findings that are shown with their frames."""
 
 
 @decode_options.source_command(
@@ -127,12 +127,12 @@ def command(  # noqa: PLR0913 - options
 
 
 def _named(words: Sequence[str]) -> str:
-    """Return what a page calls a source: a log by its name, wherever it lies."""
+    """Return the name of a source on a page. A log has its file name without the folder."""
     return ", ".join(Path(word).name if Path(word).is_file() else word for word in words) or "bus"
 
 
 def _learnt(files: Sequence[str]) -> learnt.Learnt | None:
-    """Return what was learnt from a good log; None without a file."""
+    """Return the rules learnt from a good log, or None without a file."""
     if len(files) > 1:
         raise Refused(f"learnt rules are held alone: leave {files[1]} out")
     for path in files:
@@ -152,7 +152,7 @@ def _learnt(files: Sequence[str]) -> learnt.Learnt | None:
 
 
 def _check_outputs(outputs: Mapping[str, Path | None]) -> None:
-    """Raise ValueError unless all files that are wanted could be written."""
+    """Raise ValueError unless all requested files can be written."""
     if not any(outputs.values()):
         raise ValueError("no file: give -o run.html, --pdf run.pdf or --png run.png")
     for option, path in outputs.items():
@@ -180,7 +180,7 @@ def _write(outputs: Mapping[str, Path | None], text: str, folder: Path) -> None:
 
 
 def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
-    """Return what was found, the first of it with the frames around it."""
+    """Return the findings. The first findings have the frames around them."""
     shown = seen.diagnosis.faults[:_MOST_AROUND] if around else ()
     numbers = [one.frames[0].number for one in shown if one.frames]
     found = seen.around(numbers, around) if seen.in_columns else read.around(numbers, around)
@@ -215,7 +215,7 @@ class _Seen:
         self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects, rules=rules)
 
     def by_columns(self, log: BlockLog) -> bool:
-        """Take a log in blocks; False if it is to be read frame by frame."""
+        """Process a log in blocks. Return False if it must be read frame by frame."""
         feed = column_survey.ColumnSurvey(self.decoder, self.survey)
 
         def take(block: Columns) -> None:
@@ -229,7 +229,7 @@ class _Seen:
         return True
 
     def by_frames(self, source: Source) -> None:
-        """Take a log frame by frame."""
+        """Process a log frame by frame."""
         survey = self.survey
 
         def take(records: Sequence[Record]) -> None:
@@ -245,7 +245,7 @@ class _Seen:
         self._end(source)
 
     def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
-        """Return the frames around some, as `excerpts` does, of a log that was read in blocks."""
+        """Return the frames around some frames, as `excerpts` does. The log was read in blocks."""
         return {number: self._diagnoser.kept.around(number, frames) for number in numbers}
 
     def _end(self, source: AnySource[Any]) -> None:
@@ -256,20 +256,20 @@ class _Seen:
 
 
 class _Reading:
-    """A source that is read to its end; a bus is recorded into a file first.
+    """A source that is read to its end. A bus is recorded into a file first.
 
     The log is read a second time, frame by frame, for the frames around findings.
 
     Args:
-        words: its SOURCE words.
-        bus: the options of buses.
+        words: SOURCE words that name the source.
+        bus: options of the buses.
         folder: folder for the recording.
-        span_us: time to listen to a bus; None to listen until the user interrupts.
-        cut: the part of a log to read.
+        span_us: time to listen to a bus, or None to listen until the user interrupts.
+        cut: part of a log to read.
 
     Attributes:
-        source: the source of the first reading, closed at its end.
-        messages: its messages about lost and invalid frames.
+        source: source of the first reading, closed at the end of the reading.
+        messages: messages of the source about lost and invalid frames.
     """
 
     def __init__(
@@ -291,16 +291,16 @@ class _Reading:
 
     @property
     def messages(self) -> list[str]:
-        """What the source says of frames that were lost or are none."""
+        """Messages of the source about lost frames and items that are not frames."""
         return self.source.messages()
 
     @property
     def failed(self) -> str:
-        """Why it ended before its time."""
+        """Reason why the source ended early."""
         return self.source.failed
 
     def whole(self, make: Callable[[], _Seen]) -> _Seen:
-        """Read all of it."""
+        """Read all of the source."""
         seen, log = make(), block_log(self._words, self._cut)
         if log is not None and _in_columns(seen.decoder):
             with closing(log):
@@ -319,11 +319,11 @@ class _Reading:
             self.source = source
 
     def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
-        """Return the frames around some, by their numbers, as `excerpts` does."""
+        """Return the frames around some frames by their numbers, as `excerpts` does."""
         return excerpts(self._pieces(), numbers, frames) if numbers else {}
 
     def close(self) -> None:
-        """Give back what is open."""
+        """Close the open files."""
         self.source.close()
 
     def _pieces(self) -> Iterator[Piece]:
@@ -356,11 +356,11 @@ class _FramePiece:
         self._frames = frames
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
         return len(self._frames)
 
     def cut(self, begin: int, end: int, /) -> list[Record]:
-        """Return some of the frames, by their places."""
+        """Return some of the frames by their positions."""
         return list(self._frames[begin:end])
 
 

@@ -1,4 +1,4 @@
-"""The verb `send`: frames, once or again and again."""
+"""The verb `send`, which sends frames once or repeatedly."""
 
 from __future__ import annotations
 
@@ -84,13 +84,13 @@ def command(words: Sequence[str], eds: EdsOptions, **options: Any) -> None:
 
 
 _ReadNodes = Callable[["EdsFiles", set[int]], None]
-"""Chooses files for nodes, which it asks who they are."""
+"""Function that reads the identity of nodes and chooses their files."""
 
 
 def _frames(
     words: Sequence[str], eds: EdsOptions, read_nodes: _ReadNodes
 ) -> list[CanFrame | FdFrame]:
-    """Return the frames; words with `=` belong to the PDO before them."""
+    """Return the frames. Words with `=` belong to the PDO before them."""
     texts: list[str] = []
     for word in words:
         if texts and "#" not in word and "=" in word and "#" not in texts[-1]:
@@ -108,7 +108,7 @@ def _frames(
 
 
 def _read_nodes(bus: str | None, options: BusOptions, files: EdsFiles, nodes: set[int]) -> None:
-    """Read who nodes are, so that their files are found."""
+    """Read the identities of nodes, so that their files are found."""
     source = conform_source.open_conform_source(bus, None, options)
     try:
         bus_of_nodes = node_bus.NodeBus(source.link)

@@ -1,4 +1,4 @@
-"""The verb `seq`: send and expect, step by step."""
+"""The verb `seq`, which sends and expects frames, step by step."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ else:  # python-can is slow
 
 
 class ConditionDecoder:
-    """Decodes all frames, for conditions on them.
+    """Decoder of all frames, used for conditions on frames.
 
     Attributes:
-        eds: contents of EDS files, by node-ID.
+        eds: content of EDS files by node-ID.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
@@ -52,11 +52,14 @@ class ConditionDecoder:
         self._decoder, self._latest = make_decoder(eds), DecodedCondition()
 
     def take(self, record: Record) -> None:
-        """Decode a frame; conditions are asked about it next."""
+        """Decode a frame. The next conditions apply to this frame."""
         self._latest.take(record, self._decoder.take(record))
 
     def condition(self, text: str) -> FrameCondition:
-        """Return the condition of a filter expression; ValueError if it is none."""
+        """Return the condition of a filter expression.
+
+        Raise ValueError if the text is not a filter.
+        """
         return self._latest.condition(text)
 
 
@@ -161,7 +164,7 @@ def _send(out: bus_source.Transmitter, watch: ConditionDecoder, frames: Frames) 
 
 
 def _show(run: SequenceRun, quiet: bool) -> None:
-    """Print what happened since the last time."""
+    """Print the events since the last call."""
     for event in run.events:
         if not quiet or event.mark is EventType.MISSED:
             click.echo(event_line(event))

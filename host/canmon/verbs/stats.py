@@ -1,4 +1,4 @@
-"""The verb `stats`: statistics of all identifiers."""
+"""The verb `stats`, which shows statistics of all identifiers."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ _ID_HEAD: Final = (
 )
 _NODE_HEAD: Final = ("bus", "node", "CAN-IDs", "frames", "1/s", "share %")
 _LEFT: Final = 2
-"""Columns that stand to the left: names."""
+"""Number of left-aligned columns, which contain names."""
 
 
 class _NodeRow(NamedTuple):
     """The total traffic of the identifiers of one node.
 
     Attributes:
-        channel: the bus.
-        node: its node-ID, None for identifiers without one.
-        idents: see `ident_of`.
+        channel: name of the bus.
+        node: node-ID of the node, or None for identifiers without a node-ID.
+        idents: identifiers as `ident_of` returns them.
         frames: number of frames of all these identifiers.
         bits: number of bits of these frames on the bus.
     """
@@ -61,7 +61,7 @@ class _NodeRow(NamedTuple):
 
 
 def node_rows(rows: Iterable[IdRow]) -> list[_NodeRow]:
-    """Return a row for each node, identifiers without one last."""
+    """Return a row for each node. Identifiers without a node-ID are last."""
     groups: dict[tuple[str, int], list[IdRow]] = {}
     for row in rows:
         groups.setdefault((row.channel, node_of(row.ident) or 0), []).append(row)
@@ -79,7 +79,7 @@ def node_rows(rows: Iterable[IdRow]) -> list[_NodeRow]:
 
 
 def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
-    """Return what a bus did, a line each."""
+    """Return the statistics of a bus, one per line."""
     load, span_s = bus.load, (bus.last_us - bus.first_us) / 1e6
     lines = [
         f"{bus.channel}: {bus.frames} frames in {span_s:.6f} s, {load.bits} bits with stuff bits",
@@ -131,7 +131,7 @@ def _node_cells(row: _NodeRow, bus: BusRow) -> list[str]:
 
 
 def _aligned(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return a table whose columns are as wide as what is in them."""
+    """Return a table whose columns are as wide as their content."""
     table = [head, *rows]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
@@ -144,7 +144,7 @@ def _aligned(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 
 def bus_json(bus: BusRow, bit_rate: int | None) -> str:
-    """Write a bus; loads are shares of the bit rate, null if that is not known."""
+    """Return a bus as JSON. Loads are shares of the bit rate, or null if it is unknown."""
     load, errors = bus.load, bus.errors
     return _line(
         "bus",
@@ -167,7 +167,7 @@ def bus_json(bus: BusRow, bit_rate: int | None) -> str:
 
 
 def id_json(row: IdRow) -> str:
-    """Write an identifier; times are in microseconds."""
+    """Return an identifier as JSON. Times are in microseconds."""
     gaps = None if row.gaps is None else row.gaps._asdict()
     return _line(
         "id",
@@ -185,7 +185,7 @@ def id_json(row: IdRow) -> str:
 
 
 def node_json(row: _NodeRow) -> str:
-    """Write a node; null is what has no node-ID by default."""
+    """Return a node as JSON. The node is null for identifiers without a node-ID."""
     idents: Iterable[dict[str, object]] = map(_ident, row.idents)
     return _line(
         "node", ch=row.channel, node=row.node, n=row.frames, bits=row.bits, ids=list(idents)

@@ -1,4 +1,4 @@
-"""The verb `top`: a table of all identifiers."""
+"""The verb `top`, which shows a table of all identifiers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verb `tui`: the monitor as a full-screen program."""
+"""The verb `tui`, which runs the monitor as a full-screen program."""
 
 from __future__ import annotations
 
@@ -88,12 +88,12 @@ def command(  # noqa: PLR0913 - options
 
 
 def _monitor(path: Path | None, said: MonitorSetup, *, asks: bool) -> app.MonitorApp:
-    """Make the program, with the settings of the workspace in its panels.
+    """Make the app, with the settings of the workspace in its panels.
 
     Args:
         path: path of the workspace.
         said: settings on the command line.
-        asks: whether to show the screen of settings if no source is named, so that the user enters
+        asks: whether to show the settings screen if no source is named, so that the user enters
             one.
     """
     try:

@@ -838,9 +838,6 @@ class _BusJudge:
 
         These rows are the ends of the first half second above the limit, or else of the busiest
         one.
-
-        These rows are the ends of the first half second above the limit, or else of the busiest
-        one.
         """
         first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
         steps = self._bits_by_step(first_us)

@@ -1,4 +1,4 @@
-"""The alarms tab: rules that are checked against the traffic as it comes."""
+"""The alarms tab, with rules that are checked against the traffic as it arrives."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
 _LOOK_US: Final = 100_000
-"""How often it is seen whether something is missing."""
+"""Interval of checks for missing frames."""
 
 
 class AlarmTask(Task):
-    """Checks frames, and detects missing ones; it sends nothing.
+    """Task that checks frames, and detects missing frames. It sends nothing.
 
     Args:
-        model: has the time of the source, and the number of lost frames.
+        model: model with the time of the source and the number of lost frames.
 
     Attributes:
-        alarms: state of the rules.
+        alarms: alarms with the state of the rules.
     """
 
     def __init__(self, model: Model) -> None:
@@ -45,16 +45,19 @@ class AlarmTask(Task):
 
     @property
     def bit_rate(self) -> int | None:
-        """Of the buses, None if it is not known."""
+        """Bit rate of the buses, or None if it is unknown."""
         return self._model.top.view.bit_rate
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame."""
+        """Time of the next call that is necessary without a frame."""
         return self._due_us
 
     def hold(self, rules: Rules) -> None:
-        """Hold other rules from now on; ValueError for a limit of the load without a bit rate."""
+        """Check other rules from now on.
+
+        Raise ValueError for a limit of the load without a bit rate.
+        """
         self.alarms = Alarms(rules, self.bit_rate, self._model.top.rates.fast)
         self._due_us = NEVER if rules == Rules() else 0
 
@@ -76,9 +79,9 @@ _USUAL: Final = {
     "no_lost_heartbeat": True,
     "no_loss": True,
 }
-"""Default rules; bus-off is an error frame, too."""
+"""Default rules. Bus-off is also an error frame."""
 _USUAL_LOAD: Final = {"max_load": 90}
-"""Beside it where the bit rate is known."""
+"""Default limit of the load, used if the bit rate is known."""
 LEAST_WIDTH, INDENT = 40, 4
 _BADGE_S: Final = 0.5
 _BADGES: Final = {AlarmState.BROKEN: ("!", "bold red"), AlarmState.WAS_BROKEN: ("!", "yellow")}
@@ -87,7 +90,7 @@ _STYLES: Final = {AlarmState.BROKEN: "bold red", AlarmState.WAS_BROKEN: "yellow"
 
 
 class AlarmsPanel(Panel):
-    """Rules and findings."""
+    """A list of rules and findings."""
 
     title = "alarms"
     section = "alarms"
@@ -124,11 +127,11 @@ class AlarmsPanel(Panel):
         yield TextArea(tab_behavior="focus")
 
     def on_mount(self) -> None:
-        """Let the title of the tab tell, whichever tab is shown."""
+        """Keep the title of the tab up to date, whichever tab is shown."""
         self.set_interval(_BADGE_S, self.refresh_badge)
 
     def refresh_badge(self) -> None:
-        """Mark the title of the tab while a rule is broken, and until that is acknowledged."""
+        """Mark the title of the tab while a rule is broken, until the user acknowledges it."""
         now_us = self.session.model.now_us
         with self.session.lock:
             states = {alarm.state(now_us) for alarm in self.held.alarms.rows()}
@@ -140,7 +143,7 @@ class AlarmsPanel(Panel):
             tab.label = Content.styled(title, style)
 
     def snapshot(self, model: Model) -> None:
-        """Keep how the rules stand, and of each line the finding that it tells."""
+        """Copy the state of the rules, and the finding of each line."""
         alarms = self.held.alarms
         rules = render_alarms(alarms, model.now_us)[: -len(alarms.findings) or None]
         self._lines, self._targets = rules, [None, *(one.finding for one in alarms.rows())]
@@ -157,13 +160,13 @@ class AlarmsPanel(Panel):
             self._targets += [finding] * len(parts)
 
     def _finding(self, finding: TrafficFinding, before_us: int) -> str:
-        """Write a finding, with its time as the other tabs have it."""
+        """Return a finding as text, with its time in the format of the other tabs."""
         session, (_, _, text) = self.session, str(finding).partition(") ")
         time = stamp_text(session.stamp, finding.at_us, session.origin_us, before_us)
         return f"({time}) {text}"
 
     def paint(self) -> None:
-        """Show it."""
+        """Show the snapshot."""
         lines = [_styled(line) for line in self._lines]
         if not self.held.alarms.rows():
             lines = [plain("no rules: e writes some, F1 shows how")]
@@ -175,7 +178,7 @@ class AlarmsPanel(Panel):
         view.show(lines)
 
     def on_choice_view_chosen(self) -> None:
-        """Stay at this finding, whatever comes above it."""
+        """Stay at the chosen finding while new findings appear above."""
         number = self.query_one(ChoiceView).chosen
         self._chosen = self._target(number) if number > len(self.held.alarms.rows()) else None
 
@@ -183,7 +186,7 @@ class AlarmsPanel(Panel):
         return self._targets[number] if number < len(self._targets) else None
 
     def action_frame(self) -> None:
-        """Show the frame of the chosen finding, or of the latest one of a rule, in the trace."""
+        """Show the frame of the chosen finding, or the latest finding of a rule, in the trace."""
         finding = self._target(self.query_one(ChoiceView).chosen)
         if finding is None:
             self.notify("choose a finding: the arrows do")
@@ -191,7 +194,7 @@ class AlarmsPanel(Panel):
             self.post_message(FrameWanted(finding.at_us, finding.record))
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take the rules."""
+        """Load the rules."""
         if "rules" not in settings:
             return
         words = settings["rules"]
@@ -202,28 +205,28 @@ class AlarmsPanel(Panel):
         self.rules_text, self._own = _rules_toml(words), True
 
     def save(self) -> dict[str, Any]:
-        """Return the rules of the user; None removes a rule from a workspace."""
+        """Return the rules of the user. None removes a rule from a workspace."""
         if not self._own:
             return {}
         rules = dict.fromkeys((*SWITCHES, *VALUES))
         return {"rules": {**rules, **load_toml(self.rules_text)}}
 
     def action_acknowledge(self) -> None:
-        """Take note of all that was broken."""
+        """Acknowledge all broken rules."""
         self.change(self.held.alarms.acknowledge)
 
     def action_clear(self) -> None:
-        """Start again."""
+        """Delete all findings and restart the rules."""
         self.change(self.held.alarms.clear)
 
     def action_edit(self) -> None:
-        """Write rules."""
+        """Edit the rules."""
         area = self.query_one(TextArea)
         area.text, area.display = self.rules_text, True
         area.focus()
 
     def action_apply(self) -> None:
-        """Hold the rules that are written; say what is wrong with them."""
+        """Apply the edited rules, or report an error in them."""
         area, wrong = self.query_one(TextArea), self.query_one("#wrong", Static)
         if not area.display:
             return
@@ -236,28 +239,28 @@ class AlarmsPanel(Panel):
         self.action_leave()
 
     def take_rules(self, text: str) -> None:
-        """Hold rules, written as TOML; ValueError if they are none."""
+        """Apply rules that are written as TOML. Raise ValueError if they are invalid."""
         rules = parse_rules(load_toml(text), load_rule)
         with self.session.lock:
             self.held.hold(rules)
         self.rules_text, self._own = text, True
 
     def action_leave(self) -> None:
-        """Go back to the alarms."""
+        """Return to the alarms."""
         self.query_one(TextArea).display = self.query_one("#wrong").display = False
         self.query_one(LineView).focus()
         self.refresh_view()
 
 
 def _wrapped(line: str, width: int) -> list[str]:
-    """Return a line as several, where it is longer than the screen is wide."""
+    """Split a line that is longer than the width of the screen."""
     if len(line) <= width:
         return [line]
     return wrap(line, width, subsequent_indent=" " * INDENT, break_on_hyphens=False)
 
 
 def _rules_toml(words: Mapping[str, Any]) -> str:
-    """Write rules as a person would."""
+    """Return rules as TOML in the style of a person."""
     import tomlkit  # noqa: PLC0415 - an extra
 
     return tomlkit.dumps(words)

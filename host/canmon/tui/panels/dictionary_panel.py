@@ -1,4 +1,4 @@
-"""The tab of the object dictionary: the objects of one node, read and written by SDO."""
+"""The tab of the object dictionary, with the objects of one node, read and written by SDO."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ _Node = tuple[str, int]
 """Bus and node-ID."""
 
 _NOW: Final = 0
-"""When frames are due that have not been sent yet."""
+"""Due time of frames that have not been sent yet."""
 
 _WATCH_US: Final = 1_000_000
-"""How often watched objects are read."""
+"""Interval at which watched objects are read."""
 
 
 class DictionaryTask(Task):
-    """A client of the default SDO of one node at a time (1200h).
+    """A client of the default SDO server of one node at a time (1200h).
 
-    The displayed values come from the traffic alone, including answers to other clients.
+    The displayed values come only from the traffic, including answers to other clients.
 
     Args:
-        decoder: knows the objects of the nodes.
+        decoder: decoder that knows the objects of the nodes.
 
     Attributes:
-        channel: the bus on which it sends; empty for the first bus.
+        channel: bus on which the task sends, empty for the first bus.
         result: result of the latest transfer, in words.
-        left: the pending transfers.
+        left: pending transfers.
         watched: objects that are read repeatedly.
     """
 
@@ -68,7 +68,7 @@ class DictionaryTask(Task):
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame."""
+        """Time of the next call that is necessary without a frame."""
         return _NOW if self._out else min(self._dialogue.due_us, self._watch_us)
 
     def objects(self, node: _Node) -> NodeDictionary:
@@ -79,7 +79,10 @@ class DictionaryTask(Task):
         return found
 
     def choose(self, node: _Node) -> None:
-        """Talk to a node from now on; transfers with another one are given up."""
+        """Communicate with another node from now on.
+
+        Transfers with the previous node are dropped.
+        """
         if node != self._node:
             self.stop()
             self._node, self.channel = node, node[0]
@@ -96,12 +99,15 @@ class DictionaryTask(Task):
         self._start(now_us, f"write {write_entry(entry)}", download(*entry, data))
 
     def watch(self, now_us: int, entry: Entry) -> None:
-        """Read an object of the chosen node each second, or no more if it is watched."""
+        """Read an object of the chosen node each second.
+
+        If it is watched already, stop watching it.
+        """
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Take values and answers; return requests."""
+        """Process values and answers. Return requests."""
         for one, decoded in records:
             if decoded.node is None:
                 continue
@@ -117,7 +123,7 @@ class DictionaryTask(Task):
         return out
 
     def stop(self) -> None:
-        """Give up all transfers; nothing is watched."""
+        """Drop all transfers, and stop watching."""
         self.watched.clear()
         self._watch_us = NEVER
         self._dialogue.clear()
@@ -125,7 +131,7 @@ class DictionaryTask(Task):
         self.left = 0
 
     def _read_watched(self, now_us: int) -> None:
-        """Read what is watched, unless earlier transfers go on."""
+        """Read the watched objects, unless earlier transfers are running."""
         self._watch_us += (now_us - self._watch_us) // _WATCH_US * _WATCH_US + _WATCH_US
         if not self.left:
             for entry in sorted(self.watched):
@@ -154,7 +160,7 @@ class DictionaryTask(Task):
 
 
 _MARK: Final = "* "
-"""Before an object that is watched."""
+"""Mark in front of a watched object."""
 
 
 class DictionaryPanel(Panel):
@@ -198,7 +204,7 @@ class DictionaryPanel(Panel):
         yield PromptLine()
 
     def snapshot(self, model: Model) -> None:
-        """Keep the objects of the node."""
+        """Copy the objects of the node."""
         self._known = [(row.channel, row.node) for row in model.board.rows()]
         if self.node is None and self._known:
             matching = [node for node in self._known if node[1] == self._wanted_node]
@@ -212,7 +218,7 @@ class DictionaryPanel(Panel):
         self._state = "   ".join([self._title(), *filter(None, [left])])
 
     def paint(self) -> None:
-        """Show them."""
+        """Show the snapshot."""
         head, *_ = self._lines
         self.query_one("#node", TitleLine).show(self._state)
         self.query_one("#head", TitleLine).show(" " * len(_MARK) + head)
@@ -222,7 +228,7 @@ class DictionaryPanel(Panel):
         self.query_one(ChoiceView).show(lines or [plain("no object: give --eds, or g and a node")])
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take node and filter."""
+        """Load node and filter."""
         node = settings.get("node", 0)
         if type(node) is not int or not 0 <= node <= 127:
             raise SettingError(("node",), f"{node!r} is no node-ID 1 to 127, nor 0 for any")
@@ -230,7 +236,7 @@ class DictionaryPanel(Panel):
         self.filter_text = text_of(settings, "filter", "")
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return node and filter."""
         return {"node": self._wanted_node, "filter": self.filter_text}
 
     def action_next_node(self, steps: int) -> None:
@@ -248,16 +254,16 @@ class DictionaryPanel(Panel):
         self._transfer(self._read)
 
     def action_read_all(self) -> None:
-        """Read all objects that are shown."""
+        """Read all visible objects."""
         if self.may_send():
             self.change(lambda: self._read(*self._rows))
 
     def action_watch(self) -> None:
-        """Read the chosen object each second, or no more."""
+        """Read the chosen object each second, or stop this."""
         self._transfer(lambda row: self.client.watch(self.session.now_us, row.entry))
 
     def action_write(self) -> None:
-        """Ask for a value of the chosen object, and write it."""
+        """Ask for a value of the chosen object, and write the value."""
         row = self._chosen()
         if row is not None and self.may_send():
             kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))

@@ -1,4 +1,4 @@
-r"""The tab of the graph: curves of signals, live or of a log.
+r"""The tab of the graph, with curves of signals from a bus or a log.
 
 >>> _colour_line("━ \x1b[36mspeed\x1b[0m 3")
 (('━ ', ''), ('speed', 'cyan'), (' 3', ''))
@@ -39,7 +39,7 @@ _CODE: Final = re.compile("\x1b\\[([0-9]*)m")
 
 
 def _colour_line(text: str) -> Line:
-    """Return the line; a colour lasts until the next code."""
+    """Return a line with its colours. A colour lasts until the next code."""
     pieces = _CODE.split(text)
     codes = ("", *pieces[1::2])
     found = zip(pieces[::2], codes, strict=True)
@@ -47,10 +47,10 @@ def _colour_line(text: str) -> Line:
 
 
 class GraphTask(Task):
-    """Takes the values of signals; it sends nothing.
+    """Task that collects the values of signals. It sends nothing.
 
     Args:
-        graph: the curves.
+        graph: graph with the curves.
     """
 
     def __init__(self, graph: LiveGraph) -> None:
@@ -70,7 +70,7 @@ _EMPTY: Final = "no signals: a adds one, F1 shows how"
 
 
 class GraphPanel(panel.Panel):
-    """Curves with a cursor, several axes, zoom in both directions."""
+    """Curves with a cursor, several axes, and zoom in both directions."""
 
     title = "graph"
     section = "graph"
@@ -114,7 +114,7 @@ class GraphPanel(panel.Panel):
         yield panel.PromptLine()
 
     def snapshot(self, model: Model) -> None:
-        """Draw the picture: it reads the samples."""
+        """Draw the picture, which reads the samples."""
         self.graph.now_us = model.now_us
         self.graph.first_us, self.graph.stamp = self.session.origin_us, self.session.stamp
         width, height = self.query_one(panel.PictureView).size
@@ -124,12 +124,12 @@ class GraphPanel(panel.Panel):
             self._lines = [((_EMPTY, ""),)]
 
     def paint(self) -> None:
-        """Show it."""
+        """Show the picture."""
         self.query_one("#state", panel.TitleLine).show(self._state())
         self.query_one(panel.PictureView).show(self._lines)
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take signals and window."""
+        """Load signals and window."""
         for number, text in enumerate(texts_of(settings, "signals")):
             with below("signals", number):
                 self._add_signal(text)
@@ -138,7 +138,7 @@ class GraphPanel(panel.Panel):
             self.graph.window_us = max(LEAST_US, parse_time_with_unit_us(window))
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return signals and window."""
         return {"signals": list(self._texts), "window": _time_text(self.graph.window_us)}
 
     def action_add(self) -> None:
@@ -146,22 +146,22 @@ class GraphPanel(panel.Panel):
         self.query_one(panel.PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_remove(self) -> None:
-        """Ask which signal is shown no more."""
+        """Ask which signal to remove."""
         if self._texts:
             self.query_one(panel.PromptLine).prompt("take out", self._texts[-1], self._remove)
 
     def action_graph(self, change: str, *arguments: Any) -> None:
-        """Change what is seen, as a method of the graph does: `zoom`, `move`, `fit` and others."""
+        """Change the view by a method of the graph, such as `zoom`, `move` or `fit`."""
         self.change(lambda: getattr(self.graph, change)(*arguments))
 
     def action_write(self) -> None:
-        """Ask for a file, and write the picture or the samples."""
+        """Ask for a file, and write the picture or the samples to it."""
         self.query_one(panel.PromptLine).prompt(
             "file: .svg .html .png .csv", "graph.svg", self._write
         )
 
     def on_picture_view_pointed(self, event: panel.PictureView.Pointed) -> None:
-        """Put the cursor where the mouse is."""
+        """Put the cursor at the position of the mouse."""
         with self.session.lock:
             view = self.graph.view()
             inner = max(1, self.query_one(panel.PictureView).size.width - LABEL_WIDTH - 1)
@@ -221,7 +221,7 @@ class GraphPanel(panel.Panel):
 
 
 def _time_text(time_us: int) -> str:
-    """Write a time so that it is read again.
+    """Return a time as text that can be read again.
 
     >>> _time_text(10_000_000), _time_text(1_500), _time_text(2_000)
     ('10s', '1500us', '2ms')

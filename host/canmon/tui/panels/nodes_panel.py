@@ -1,4 +1,4 @@
-"""The tab of the node board: all nodes, one of them in full, and NMT commands."""
+"""The tab of the node board, with all nodes, details of one node, and NMT commands."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _STATE_STYLES: Final[dict[int | None, str]] = {
 FULL, EMPTY = "█", "░"
 _GAP: Final = "  "
 MIDDLE, WIDE = 110, 160
-"""From this number of columns on, the board has more of them."""
+"""Numbers of columns of the screen from which the board has more columns."""
 _LEAST_ERRORS: Final = 12
 
 
@@ -50,11 +50,11 @@ class _BoardColumn(NamedTuple):
     """A column of the board.
 
     Attributes:
-        title: its head.
-        cell: returns its text for a node at a time, in a board of a given width.
-        least: the smallest screen width that shows it, in columns.
-        most: its width in characters; longer texts are cut.
-        kept: whether it is shown even if it is empty for all nodes.
+        title: title of the column.
+        cell: function that returns the text for a node at a time, in a board of a given width.
+        least: smallest width of a screen that shows the column.
+        most: width of the column in characters. Longer texts are cut.
+        kept: whether the column is shown even if it is empty for all nodes.
     """
 
     title: str
@@ -68,9 +68,9 @@ def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) 
     """Return a head, and a line for each node, as wide as the screen if possible.
 
     Args:
-        rows: the nodes.
-        now_us: the time to which ages refer.
-        width: columns of the screen.
+        rows: nodes of the board.
+        now_us: time to which ages refer.
+        width: number of columns of the screen.
     """
     several = len({row.channel for row in rows}) > 1
     tables = [(column, _cells(column, rows, now_us, width)) for column in _columns(several, width)]
@@ -94,7 +94,7 @@ def _cells(
 
 
 def _widths(used: Sequence[tuple[_BoardColumn, Sequence[Line]]], width: int) -> list[int]:
-    """Return the width of each column; the last one has what is left."""
+    """Return the width of each column. The last column has the remaining width."""
     widths = [
         min(column.most, max(len(column.title), *map(line_width, cells), 0))
         for column, cells in used
@@ -116,7 +116,7 @@ def _joined(columns: Sequence[Sequence[Line]], widths: Sequence[int]) -> Iterato
 
 
 def _cut(line: Line, width: int) -> Line:
-    """Return a line of at most `most` characters; a cut line ends with an ellipsis.
+    """Return a line of at most `most` characters. A cut line ends with an ellipsis.
 
     >>> _cut((("pre-", "bold"), ("operational", "")), 8)
     (('pre-', 'bold'), ('ope…', ''))
@@ -148,7 +148,7 @@ def _state(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
-    """Write how old the heartbeat is: a bar that is full after a period, and numbers."""
+    """Return the age of the heartbeat as numbers and as a bar that is full after a period."""
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
         return plain("never seen", BAD) if period_us else ()
@@ -172,7 +172,7 @@ def _boots(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 def _error_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
-    """Return what is wrong with a node in words, the worst first; empty for nothing."""
+    """Return the faults of a node in words, empty for none. The worst fault is first."""
     pieces = [("two nodes have this node-ID", BAD)] * row.doubled
     if row.error_code:
         pieces.append((f"{row.error_code:04X}h {describe(row.error_code)}", BAD))
@@ -214,14 +214,14 @@ def card_lines(
     stamp: Stamp = Stamp.ABSOLUTE,
     origin_us: int = 0,
 ) -> list[Line]:
-    """Return the known data of one node, and the EMCYs of all nodes, the latest first.
+    """Return the data of one node, and the EMCYs of all nodes. The latest EMCY is first.
 
     Args:
-        row: the node.
+        row: node of the card.
         rows: all nodes.
-        width: columns of the screen; a longer text continues on the next line.
+        width: number of columns of the screen. A longer text continues on the next line.
         stamp: format of times.
-        origin_us: the time of the first frame.
+        origin_us: time of the first frame.
     """
     name = node_board.name_text(row)
     where = f"{row.channel} node {row.node}" + f": {name}" * bool(name)
@@ -253,11 +253,11 @@ def _wrapped(title: str, text: str, width: int) -> list[Line]:
 # Sends NMT commands.
 
 _NOW: Final = 0
-"""When commands are due that have not been sent yet."""
+"""Due time of commands that have not been sent yet."""
 
 
 class _NodeTask(Task):
-    """Sends NMT commands and requests; the traffic shows their results."""
+    """Task that sends NMT commands and requests. The traffic shows their results."""
 
     def __init__(self) -> None:
         self.channel = ""
@@ -268,27 +268,27 @@ class _NodeTask(Task):
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame."""
+        """Time of the next call that is necessary without a frame."""
         return _NOW if self._out else self._due_us
 
     @property
     def scans(self) -> bool:
-        """Whether node-IDs are still asked."""
+        """Whether a scan of node-IDs is running."""
         return bool(self._asks)
 
     def scan(self, channel: str, now_us: int) -> None:
-        """Ask all node-IDs of a bus for their device type, and who answers for its identity."""
+        """Request the device type of all node-IDs of a bus, and the identity of the nodes found."""
         self.channel, self._due_us = channel, now_us
         self._answered_ids.clear()
         self._asks = deque(_upload(node, *DEVICE_TYPE) for node in _NODE_IDS)
 
     def command(self, channel: str, node: int, command: NmtCommand) -> None:
-        """Command a node on a bus, or all nodes there by 0."""
+        """Send an NMT command to a node on a bus, or to all nodes with node-ID 0."""
         self.channel = channel
         self._out.append(CanFrame(NMT_COB_ID, bytes((command, node))))
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Return what is to be sent."""
+        """Return the frames to send."""
         out, self._out = self._out, []
         if self._due_us == NEVER:
             return tuple(out)
@@ -303,7 +303,7 @@ class _NodeTask(Task):
         return tuple(out)
 
     def stop(self) -> None:
-        """Send nothing that was not sent yet."""
+        """Drop everything that was not sent yet."""
         self._out.clear()
         self._asks.clear()
         self._due_us = NEVER
@@ -328,14 +328,14 @@ def _answers(record: Record, node: int) -> bool:
 _NODE_IDS: Final = range(1, 128)
 _IDENTITY: Final = tuple((0x1018, sub) for sub in (1, 2, 3))
 _ASK_US: Final = 10_000
-"""Between two requests: 5 % of a bus of 125 kbit/s, and time for an answer."""
+"""Time between two requests, which is 5 % of a bus of 125 kbit/s, and time for an answer."""
 _YES: Final = ("y", "yes")
 _SHARE: Final = 0.6
-"""The board takes no more of the tab."""
+"""Largest share of the tab that the board uses."""
 
 
 class NodesPanel(Panel):
-    """A row for each node, and a card of the chosen one."""
+    """A row for each node, and a card of the chosen node."""
 
     title = "nodes"
     section = "nodes_view"
@@ -377,12 +377,12 @@ class NodesPanel(Panel):
 
     @property
     def chosen(self) -> node_board.NodeStatus | None:
-        """The chosen node; None where there is none."""
+        """The chosen node, or None if there is none."""
         number = self.query_one(ChoiceView).chosen
         return self._rows[number] if number < len(self._rows) else None
 
     def snapshot(self, model: Model) -> None:
-        """Keep the board, and the card of the chosen node."""
+        """Copy the board, and the card of the chosen node."""
         self._rows = model.board.rows()
         width = self.query_one(ChoiceView).scrollable_content_region.width
         self._lines = board_lines(self._rows, model.now_us, width)
@@ -392,7 +392,7 @@ class NodesPanel(Panel):
         self._card = [] if row is None else card_lines(row, self._rows, wide, stamp, origin_us)
 
     def paint(self) -> None:
-        """Show them; the board takes no more room than it needs."""
+        """Show the snapshot. The board takes no more room than it needs."""
         head, *rows = self._lines
         title, view = self.query_one("#head", TitleLine), self.query_one(ChoiceView)
         title.styles.text_style = "bold"
@@ -414,7 +414,7 @@ class NodesPanel(Panel):
         return row.channel if row else next(iter(self.session.buses), "")
 
     def action_scan(self) -> None:
-        """Ask whether all node-IDs shall be asked who they are."""
+        """Ask whether to request the identity of all node-IDs."""
         if not self.session.can_send:
             self.notify("a log has no nodes to be asked")
         elif self.may_send():
@@ -441,7 +441,7 @@ class NodesPanel(Panel):
             panel.show_node((row.channel, row.node))
 
     def action_command(self, word: str, to_all: bool = False) -> None:
-        """Ask whether an NMT command shall be sent to the chosen node, or to all on its bus."""
+        """Ask whether to send an NMT command to the chosen node, or to all nodes on its bus."""
         row = self.chosen
         if row is None or not self.may_send():
             return

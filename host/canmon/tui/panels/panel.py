@@ -1,4 +1,4 @@
-"""What every tab of the monitor is, and which there are: ours, then those of packages."""
+"""The base class of all tabs of the monitor, and the list of built-in and installed tabs."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from tickrig.host.tui import Line, LineView
 
 
 class TitleLine(Static):
-    """Shows a text in one line.
+    """A line that shows a text.
 
     Args:
-        name: its id.
+        name: id of the widget.
     """
 
     DEFAULT_CSS = "TitleLine { height: 1; }"
@@ -37,7 +37,7 @@ class TitleLine(Static):
         super().__init__(id=name, markup=False)
 
     def show(self, text: str) -> None:
-        """Show another text; nothing moves for that."""
+        """Show another text, without a new layout."""
         if self.content != text:
             self.update(text, layout=False)
 
@@ -46,14 +46,14 @@ _CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
-    """Shows lines, the chosen one reversed.
+    """A list of lines, in which the chosen line is reversed.
 
     Attributes:
-        chosen: the number of the chosen line, from 0.
+        chosen: number of the chosen line, from 0.
     """
 
     class Chosen(Message):
-        """A line was selected."""
+        """Message that a line was chosen."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "choose(-1)", "up", show=False),
@@ -70,7 +70,7 @@ class ChoiceView(LineView):
         self._rows: list[Line] = []
 
     def show(self, lines: Sequence[Line], begin: int = 0, total: int | None = None) -> None:
-        """Show lines, all of which are there."""
+        """Show lines, which are all lines of the list."""
         self._rows = list(lines)
         self.chosen = min(self.chosen, max(0, len(lines) - 1))
         marked = [
@@ -82,7 +82,7 @@ class ChoiceView(LineView):
         super().show(marked)
 
     def choose(self, number: int) -> None:
-        """Choose a line, and bring it into view."""
+        """Choose a line, and scroll it into view."""
         self.chosen = min(max(0, number), max(0, len(self._rows) - 1))
         self.show(self._rows)
         if not self.top <= self.chosen < self.top + self.rows:
@@ -91,11 +91,11 @@ class ChoiceView(LineView):
         self.post_message(self.Chosen())
 
     def action_choose(self, steps: int) -> None:
-        """Choose a line further down, or up."""
+        """Choose a line that is further down or up."""
         self.choose(self.chosen + steps)
 
     def action_choose_page(self, pages: int) -> None:
-        """Choose a line a screen further."""
+        """Choose a line that is a screen further."""
         self.choose(self.chosen + pages * max(1, self.rows))
 
     def action_choose_end(self, last: bool) -> None:
@@ -108,11 +108,11 @@ class ChoiceView(LineView):
 
 
 _Take = Callable[[str], None]
-"""Takes an answer; ValueError says what is wrong with it."""
+"""Function that takes an answer. It raises ValueError if the answer is wrong."""
 
 
 class PromptLine(Vertical):
-    """Is hidden until something is asked; Enter answers, Escape does not."""
+    """A prompt that is hidden until a question is asked. Enter answers, Escape does not."""
 
     DEFAULT_CSS = """
     PromptLine { display: none; height: auto; }
@@ -128,7 +128,7 @@ class PromptLine(Vertical):
         self._back: Widget | None = None
 
     def compose(self) -> ComposeResult:
-        """Lay out question, answer and what is wrong with it."""
+        """Lay out question, answer and error message."""
         yield Static(id="question", markup=False)
         yield Input(id="answer", compact=True)
         yield Static(id="wrong", markup=False)
@@ -137,9 +137,9 @@ class PromptLine(Vertical):
         """Ask the user for a text.
 
         Args:
-            question: the question.
-            answer: the default answer.
-            take: called with the answer.
+            question: text of the question.
+            answer: default answer.
+            take: function that is called with the answer.
         """
         if not self.display:
             self._back = self.screen.focused
@@ -151,7 +151,7 @@ class PromptLine(Vertical):
         field.focus()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Pass on the answer; show what is wrong with it."""
+        """Pass on the answer. Show an error if the answer is wrong."""
         event.stop()
         assert self._take is not None, "something was asked"
         try:
@@ -164,20 +164,20 @@ class PromptLine(Vertical):
         self.action_leave()
 
     def action_leave(self) -> None:
-        """Ask no more."""
+        """Close the prompt."""
         self.display = False
         if self._back is not None:
             self._back.focus()
 
 
 class PictureView(LineView, inherit_bindings=False):
-    """Shows a picture; its keys are those of the panel."""
+    """A picture whose keys are those of the panel."""
 
     class Pointed(Message):
-        """It was clicked.
+        """Message that the picture was clicked.
 
         Attributes:
-            x: the column in characters.
+            x: column of the click in characters.
         """
 
         def __init__(self, x: int) -> None:
@@ -185,7 +185,7 @@ class PictureView(LineView, inherit_bindings=False):
             self.x = x
 
     def on_click(self, event: Click) -> None:
-        """Tell where."""
+        """Report the position of the click."""
         self.post_message(self.Pointed(event.x))
 
 
@@ -193,7 +193,7 @@ class PictureView(LineView, inherit_bindings=False):
 
 
 def read_help(module: str) -> str:
-    """Return the help of a tab, in Markdown: it is in a file beside the module of the tab."""
+    """Return the help of a tab in Markdown, from a file beside the module of the tab."""
     return Path(module).with_suffix(".md").read_text("utf-8")
 
 
@@ -201,8 +201,8 @@ class FrameWanted(Message):
     """A request to show a frame in the trace.
 
     Args:
-        at_us: its time.
-        record: the frame; None for the latest frame up to that time.
+        at_us: time of the frame.
+        record: frame to show, or None for the latest frame up to `at_us`.
     """
 
     def __init__(self, at_us: int, record: AnyRecord | None) -> None:
@@ -211,21 +211,22 @@ class FrameWanted(Message):
 
 
 class Panel(Vertical):
-    """A tab.
+    """A tab of the monitor.
 
-    While it is visible, the app calls `refresh_view` ten times a second; the panel may call it
-    after a key. Keys are Textual `BINDINGS`, each with a description; `HELP` is Markdown. Both are
-    shown by F1.
+    While the panel is visible, the app calls `refresh_view` ten times a second. The panel may call
+    `refresh_view` after a key. Keys are Textual `BINDINGS`, each with a description. `HELP` is
+    Markdown. F1 shows the keys and the help.
 
-    A panel that needs every frame, or sends, adds a `Task` to `session.tasks` when it is created.
+    A panel that needs every frame, or sends frames, adds a `Task` to `session.tasks` when it is
+    created.
 
     Args:
-        session: the traffic, and the means to send.
+        session: session with the traffic and the buses to send on.
 
     Attributes:
-        title: of the tab.
-        section: its table in the workspace, and the id of its widget.
-        session: as given.
+        title: title of the tab.
+        section: name of the panel's table in the workspace, which is also the id of its widget.
+        session: session with the traffic and the buses to send on.
     """
 
     title: ClassVar[str] = ""
@@ -236,14 +237,14 @@ class Panel(Vertical):
         self.session = session
 
     def enter(self) -> None:
-        """Let the keys go to it; it has come onto the screen."""
+        """Take the keyboard focus when the panel becomes visible."""
         for widget in (*self.query(LineView), *self.query("*")):
             if widget.focusable:
                 widget.focus()
                 return
 
     def refresh_view(self) -> None:
-        """Take a snapshot of the model, and paint it."""
+        """Take a snapshot of the model, and show it."""
         with self.session.lock:
             self.snapshot(self.session.model)
         self.paint()
@@ -255,30 +256,33 @@ class Panel(Vertical):
         self.refresh_view()
 
     def may_send(self) -> bool:
-        """Return whether frames are sent; if not, tell the user why."""
+        """Return whether frames may be sent. If not, show the reason to the user."""
         if not self.session.armed:
             self.notify("not armed: nothing is sent; A arms", markup=False)
         return self.session.armed
 
     def snapshot(self, model: Model) -> None:
-        """Copy what is painted from the model; the session waits, so be quick."""
+        """Copy the data to show from the model. The session waits, so be quick."""
 
     def paint(self) -> None:
-        """Show what the snapshot kept; the panel is on the screen."""
+        """Show the data of the snapshot while the panel is visible."""
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Apply settings of the workspace, before the panel is on a screen.
 
-        It ignores unknown keys: they stay in the file.
+        The method ignores unknown keys, which stay in the file.
 
         Raises:
-            SettingError: an invalid value; the message names it.
+            SettingError: a value is invalid. The message names the value.
         """
 
     def save(self) -> dict[str, Any]:
-        """Return all its settings as TOML values: tables, arrays, strings, numbers, booleans.
+        """Return all settings of the panel as TOML values.
 
-        It is also called while the panel is not on a screen: do not read values from widgets.
+        The values are tables, arrays, strings, numbers and booleans.
+
+        The app also calls this method while the panel is not on a screen. Do not read values from
+        widgets.
         """
         return {}
 
@@ -287,8 +291,8 @@ class SendingPanel(Panel):
     """A tab that sends on one bus at a time.
 
     Args:
-        session: the traffic, and the means to send.
-        sender: the task that sends.
+        session: session with the traffic and the buses to send on.
+        sender: task that sends the frames.
     """
 
     def __init__(self, session: Session, sender: Task) -> None:
@@ -297,15 +301,15 @@ class SendingPanel(Panel):
         session.tasks.append(sender)
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take the bus."""
+        """Load the bus."""
         self._sender.channel = checked_bus(self.session.buses, settings)
 
     def action_stop(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self.change(self._sender.stop)
 
     def action_bus(self) -> None:
-        """Send on the next bus."""
+        """Send on the next bus from now on."""
         self.change(self._take_next_bus)
 
     def _take_next_bus(self) -> None:
@@ -332,15 +336,15 @@ TABS: Final = ExtensionGroup[type[Panel]](
     lambda found: isinstance(found, type) and issubclass(found, Panel) and bool(found.title),
     "a Panel with a title",
 )
-"""By their sections in a workspace; key 1 shows the first, and so on."""
+"""Tabs by their sections in a workspace. Key 1 shows the first tab, and so on."""
 
 
 def make_panels(session: Session, notify: Callable[[str], None]) -> list[Panel]:
-    """Return all tabs; tabs of other packages that cannot be created are left out.
+    """Return all tabs. Tabs of other packages that cannot be created are left out.
 
     Args:
-        session: the session that they show.
-        notify: called with a line of text about each tab that is left out.
+        session: session that the tabs show.
+        notify: function that is called with a line of text about each tab that is left out.
     """
     return list(_panels(session, notify))
 

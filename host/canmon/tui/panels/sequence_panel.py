@@ -1,4 +1,4 @@
-"""The tab of the sequences: an editor, and the events of a running sequence.
+"""The tab of the sequences, with an editor and the events of a running sequence.
 
 >>> sequence_name('name = "start"', 1), sequence_name("# sync" + chr(10) + "+10 080#", 2)
 ('start', 'sync')
@@ -53,19 +53,19 @@ send = "080#"
 [[step]]
 wait = "100ms"
 """
-"""What a new sequence begins with."""
+"""Initial text of a new sequence."""
 
 _NAME: Final = re.compile(r"""\s*(?:name\s*=\s*["'](.+?)["']|#\s*(.+?))\s*""")
 
 
 def sequence_name(text: str, number: int) -> str:
-    """Return what a sequence is called: by its name, or a comment on its first line."""
+    """Return the name of a sequence, which is its `name`, or a comment on its first line."""
     match = _NAME.fullmatch(text.partition("\n")[0])
     return (match[1] or match[2]) if match else f"sequence {number}"
 
 
 def _read_texts(settings: Mapping[str, Any]) -> list[str]:
-    """Return the texts of `[[item]]`; SettingError if one is none."""
+    """Return the texts of `[[item]]`. Raise SettingError if one is not a text."""
     texts = []
     for number, item in enumerate(tables(settings, "item")):
         with below("item", number):
@@ -74,7 +74,7 @@ def _read_texts(settings: Mapping[str, Any]) -> list[str]:
 
 
 def texts_settings(texts: list[str]) -> list[dict[str, Any]]:
-    """Return them as settings, each over as many lines as it has."""
+    """Return texts as settings. Each text keeps its lines."""
     import tomlkit  # noqa: PLC0415 - an extra
     from tomlkit.exceptions import InvalidStringError  # noqa: PLC0415
 
@@ -91,21 +91,22 @@ def texts_settings(texts: list[str]) -> list[dict[str, Any]]:
 
 
 _KEPT: Final = 1_000
-"""Notes that are kept."""
+"""Number of events that are kept."""
 
 _LINES: Final = ("+", "loop")
-"""What a sequence of plain lines begins with; others are TOML."""
+"""Beginnings of a sequence of plain lines. Other sequences are TOML."""
 
 
 class SequenceTask(Task):
-    """Executes one sequence at a time.
+    """Task that executes one sequence at a time.
 
     Args:
-        eds: contents of EDS files, by node-ID.
-        channel: the bus on which it sends; empty for the first bus.
+        eds: content of EDS files by node-ID.
+        channel: bus on which the task sends, empty for the first bus.
 
     Attributes:
-        events: events of the execution, the latest last; times count from the beginning.
+        events: events of the execution. The latest event is last, and times count from the
+            beginning.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
@@ -117,16 +118,16 @@ class SequenceTask(Task):
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether a sequence is running."""
         return self._run is not None
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called without a frame."""
+        """Time of the next call that is necessary without a frame."""
         return NEVER if self._run is None else self._run.due_us
 
     def parse(self, text: str, name: str) -> Steps:
-        """Read a sequence, plain lines or TOML; StepError if it is none."""
+        """Read a sequence of plain lines or TOML. Raise StepError if it is invalid."""
         lines = (line.strip() for line in text.splitlines())
         begin = next((line for line in lines if line and not line.startswith("#")), "")
         if begin.startswith(_LINES):
@@ -135,12 +136,12 @@ class SequenceTask(Task):
         return TomlSequence(text, name, resolve=resolve, condition=condition).parse()
 
     def start(self, sequence: Steps) -> None:
-        """Carry it out from the next call on, in the place of one that runs."""
+        """Start a sequence at the next call. It replaces a running sequence."""
         self.events.clear()
         self._begin_us, self._run = None, SequenceRun(sequence)
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Process records; return the frames that the sequence sends."""
+        """Process records. Return the frames that the sequence sends."""
         run = self._run
         if run is None:
             return ()
@@ -158,7 +159,7 @@ class SequenceTask(Task):
         return tuple(out)
 
     def stop(self) -> None:
-        """Give it up."""
+        """Stop the sequence."""
         if self._run is not None:
             self._run = None
             at_us = self.events[-1].at_us if self.events else 0
@@ -170,7 +171,7 @@ _PLACE: Final = re.compile(r".*?:([0-9]+): ")
 
 
 class SequencePanel(SendingPanel):
-    """Sequences, one of them in the editor."""
+    """A list of sequences, one of which is in the editor."""
 
     title = "sequence"
     section = "sequence"
@@ -205,7 +206,7 @@ class SequencePanel(SendingPanel):
         self._going = False
 
     def compose(self) -> ComposeResult:
-        """Lay out what happens and the editor."""
+        """Lay out the events and the editor."""
         yield TitleLine("state")
         with Horizontal():
             yield LineView()
@@ -214,11 +215,11 @@ class SequencePanel(SendingPanel):
         yield PromptLine()
 
     def snapshot(self, model: Model) -> None:
-        """Keep what happened."""
+        """Copy the events."""
         self._events, self._going = list(self.runner.events), self.runner.running
 
     def paint(self) -> None:
-        """Show it, the latest in view; or the steps."""
+        """Show the events with the latest in view, or show the steps."""
         self.query_one("#state", TitleLine).show(self._state())
         view = self.query_one(LineView)
         follows = view.follows
@@ -228,27 +229,27 @@ class SequencePanel(SendingPanel):
             view.show_end()
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take the bus and the sequences."""
+        """Load the bus and the sequences."""
         super().load(settings)
         self.texts = _read_texts(settings) or [NEW]
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return the bus and the sequences."""
         return {"bus": self.runner.channel, "item": texts_settings(self.texts)}
 
     def on_text_area_changed(self, event: TextArea.Changed) -> None:
-        """Keep what is written."""
+        """Store the edited text."""
         self.texts[self.number] = event.text_area.text
 
     def action_run(self) -> None:
-        """Carry out the sequence of the editor."""
+        """Run the sequence of the editor."""
         sequence = self._read()
         if sequence is not None and self.may_send():
             self._steps = []
             self.change(lambda: self.runner.start(sequence))
 
     def action_steps(self) -> None:
-        """Show the steps; nothing is sent."""
+        """Show the steps. Nothing is sent."""
         sequence = self._read()
         if sequence is not None:
             self._steps = outline(sequence.steps)
@@ -272,7 +273,7 @@ class SequencePanel(SendingPanel):
         self._open(len(self.texts) - 1)
 
     def action_remove(self) -> None:
-        """Forget the sequence of the editor."""
+        """Remove the sequence of the editor."""
         del self.texts[self.number]
         self.texts = self.texts or [NEW]
         self._open(min(self.number, len(self.texts) - 1))
@@ -287,7 +288,10 @@ class SequencePanel(SendingPanel):
         self.query_one(PromptLine).prompt("write the sequence to file", name, self._write_file)
 
     def _read(self) -> Steps | None:
-        """Return the sequence of the editor; say what is wrong with it, and go there."""
+        """Return the sequence of the editor.
+
+        If it is invalid, report the error and go to its place.
+        """
         wrong, area = self.query_one("#mistake", Static), self.query_one(TextArea)
         try:
             sequence = self.runner.parse(area.text, self._called())

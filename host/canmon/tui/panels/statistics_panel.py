@@ -1,4 +1,4 @@
-r"""The tab of the statistics: all identifiers, their rates, gaps, jitter, missed cycles, bits.
+r"""The tab of the statistics of all identifiers: rates, gaps, jitter, missed cycles and bits.
 
 >>> _ansi_line("01 \x1b[7mFF\x1b[0m")
 (('01 ', ''), ('FF', 'bold yellow'))
@@ -22,7 +22,7 @@ from tickrig.host.tui import Line, LineView, plain
 
 
 def _ansi_line(text: str) -> Line:
-    """Return the line; what is reversed there has changed."""
+    """Return a line with its styles. Reversed text has changed."""
     pieces = []
     for part in text.split(REVERSE):
         marked, found, rest = part.partition(PLAIN)
@@ -31,7 +31,7 @@ def _ansi_line(text: str) -> Line:
 
 
 _TITLE: Final = "CAN-ID"
-"""Is in the last line above the rows."""
+"""Text in the last line above the rows."""
 
 
 class StatisticsPanel(Panel):
@@ -55,14 +55,14 @@ class StatisticsPanel(Panel):
         self._lines: list[Line] = []
 
     def compose(self) -> ComposeResult:
-        """Lay out the heads, which stay, and the rows."""
+        """Lay out the heads, which do not scroll, and the rows."""
         heads = LineView(id="heads")
         heads.can_focus = False
         yield heads
         yield LineView(id="rows")
 
     def snapshot(self, model: Model) -> None:
-        """Keep the table as wide as the screen, and as long as it is."""
+        """Copy the whole table, as wide as the screen."""
         top = model.top
         top.view = replace(top.view, keys=False)
         lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
@@ -71,14 +71,14 @@ class StatisticsPanel(Panel):
         self._lines = [_ansi_line(line) for line in lines[heads:]]
 
     def paint(self) -> None:
-        """Show it."""
+        """Show the snapshot."""
         heads = self.query_one("#heads", LineView)
         heads.styles.height = max(1, len(self._heads))
         heads.show(self._heads)
         self.query_one("#rows", LineView).show(self._lines)
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take order and what is shown."""
+        """Load the order and the displayed columns."""
         top = self.session.model.top
         order = choice(settings, "sort", top.view.order, list(RowOrder))
         bits = truth(settings, "bits", top.view.bits)
@@ -87,11 +87,11 @@ class StatisticsPanel(Panel):
             top.press("d")
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return the order and the displayed columns."""
         view = self.session.model.top.view
         decode = view.meaning is not None
         return {"sort": str(view.order), "bits": view.bits, "decode": decode}
 
     def action_press(self, key: str) -> None:
-        """Act as `canmon top` does."""
+        """Process a key as `canmon top` does."""
         self.change(lambda: self.session.model.top.press(key))

@@ -1,4 +1,4 @@
-"""The tab of the transmit list: frames that are sent cyclically or by hand.
+"""The tab of the transmit list, with frames that are sent cyclically or by hand.
 
 >>> _read_row({"send": "080#", "every": "10ms"}).every
 '10ms'
@@ -22,7 +22,7 @@ from tickrig.wire.can import CanFrame, FdFrame
 
 
 def _read_row(settings: Mapping[str, Any]) -> transmit.RowText:
-    """Return what a row says; SettingError if a setting is none."""
+    """Return the row that settings describe. Raise SettingError if a setting is invalid."""
     return transmit.RowText(
         text_of(settings, "send", ""),
         text_of(settings, "every", ""),
@@ -33,7 +33,7 @@ def _read_row(settings: Mapping[str, Any]) -> transmit.RowText:
 
 
 def _row_settings(words: transmit.RowText) -> dict[str, Any]:
-    """Return it as settings; what is empty is None, so that a workspace leaves it out."""
+    """Return a row as settings. Empty values are None, so that a workspace omits them."""
     return {
         "send": words.frame,
         "every": words.every or None,
@@ -48,15 +48,15 @@ _NOW: Final = 0
 
 
 class TransmitTask(Task):
-    """Sends rows of a list: cyclically, or by hand.
+    """Task that sends the rows of a list cyclically, or by hand.
 
     Args:
-        eds: contents of EDS files, by node-ID.
-        channel: the bus on which it sends; empty for the first bus.
+        eds: content of EDS files by node-ID.
+        channel: bus on which the task sends, empty for the first bus.
 
     Attributes:
         words: text of each row.
-        list: the rows.
+        list: list of the rows.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
@@ -68,25 +68,25 @@ class TransmitTask(Task):
 
     @property
     def due_us(self) -> int:
-        """When it next wants to be called."""
+        """Time of the next call that is necessary."""
         return _NOW if self._out else self.list.due_us
 
     def add(self, words: transmit.RowText) -> None:
-        """Add a row at the end; ValueError if it cannot be sent."""
+        """Add a row at the end. Raise ValueError if the row cannot be sent."""
         self.list.rows.append(words.row(self._pdos))
         self.words.append(words)
 
     def change(self, number: int, words: transmit.RowText) -> None:
-        """Put another row in the place of one, which sends no more; ValueError as `add`."""
+        """Replace a row, which is no longer sent. Raise ValueError as `add` does."""
         self.list.rows[number] = words.row(self._pdos)
         self.words[number] = words
 
     def remove(self, number: int) -> None:
-        """Take out a row."""
+        """Remove a row."""
         del self.list.rows[number], self.words[number]
 
     def enable(self, number: int, now_us: int, *, armed: bool) -> None:
-        """Send a row in each period, or no more if it does; ValueError if that must not be."""
+        """Send a row in each period, or stop this. Raise ValueError if that is not allowed."""
         row = self.list.rows[number]
         if row.enabled:
             row.disable()
@@ -96,21 +96,21 @@ class TransmitTask(Task):
         self._remember(number)
 
     def once(self, number: int, *, armed: bool) -> None:
-        """Send a row now; ValueError if it is not armed."""
+        """Send a row now. Raise ValueError if the list is not armed."""
         self.list.armed = armed
         if armed:
             self._remember(number)
         self._out += self.list.once(number)
 
     def _remember(self, number: int) -> None:
-        """Give a row of a PDO the values that were sent for objects which it does not name."""
+        """Set the objects that a row of a PDO does not name to the values that were sent last."""
         words, row = self.words[number], self.list.rows[number]
         if "#" not in words.frame:
             row.frame = self._pdos.frame(words.frame)
             self._pdos.remember(words.frame)
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> transmit.AnyFrames:
-        """Return what is due."""
+        """Return the frames that are due."""
         out, self._out = self._out, []
         return (*out, *self.list.tick(now_us))
 
@@ -124,7 +124,7 @@ _QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KI
 
 
 class TransmitPanel(panel.SendingPanel):
-    """Rows, each with a frame, a period, and fields that change."""
+    """A list of rows, each with a frame, a period, and fields that change."""
 
     title = "transmit"
     section = "transmit"
@@ -153,15 +153,15 @@ class TransmitPanel(panel.SendingPanel):
 
     @property
     def chosen(self) -> int:
-        """The number of the chosen row."""
+        """The number of the selected row."""
         return self.query_one(panel.ChoiceView).chosen
 
     def snapshot(self, model: Model) -> None:
-        """Keep the list."""
+        """Copy the list."""
         self._lines = transmit.render_transmit(self.transmit.list.rows)
 
     def paint(self) -> None:
-        """Show it."""
+        """Show the snapshot."""
         head, *rows = self._lines
         bus = f"   bus {self.transmit.channel}" if self.transmit.channel else ""
         self.query_one("#head", panel.TitleLine).show(head + bus)
@@ -171,32 +171,32 @@ class TransmitPanel(panel.SendingPanel):
         )
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take the bus and the rows; none of them is enabled."""
+        """Load the bus and the rows. No row is enabled."""
         super().load(settings)
         for number, table in enumerate(tables(settings, "row")):
             with below("row", number):
                 self.transmit.add(_read_row(table))
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return the bus and the rows."""
         rows = [_row_settings(words) for words in self.transmit.words]
         return {"bus": self.transmit.channel, "row": rows}
 
     def action_enable(self) -> None:
-        """Send the chosen row in each period, or no more."""
+        """Send the selected row in each period, or stop this."""
         session = self.session
         self._act(lambda number: self.transmit.enable(number, session.now_us, armed=session.armed))
 
     def action_once(self) -> None:
-        """Send the chosen row now."""
+        """Send the selected row now."""
         self._act(lambda number: self.transmit.once(number, armed=self.session.armed))
 
     def action_add(self) -> None:
-        """Write a new row."""
+        """Ask for a new row."""
         self.query_one(panel.PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_edit(self) -> None:
-        """Write the selected row again."""
+        """Edit the selected row."""
         number = self.chosen
         if number < len(self.transmit.words):
             self.query_one(panel.PromptLine).prompt(
@@ -204,7 +204,7 @@ class TransmitPanel(panel.SendingPanel):
             )
 
     def action_remove(self) -> None:
-        """Take out the chosen row."""
+        """Remove the selected row."""
         self._act(self.transmit.remove)
 
     def _act(self, act: Callable[[int], None]) -> None:
