@@ -1,4 +1,4 @@
-"""Common parts of all panels: the frame, the keys at the foot, lines of text.
+"""Common parts of all panels, which are the frame, the keys at the foot, and lines of text.
 
 The live tables of all panels are lines of text that are painted one by one.
 
@@ -7,7 +7,7 @@ A table of Textual takes eight times as long to paint.
 >>> line_text((("185", "bold"), (" 37", "")))
 '185 37'
 
-The keys at the bottom of a screen, on as many lines as they need.
+The keys are at the bottom of a screen, on as many lines as they need.
 
 >>> keys = [Key("f1", "F1", "help"), Key("q", "q", "quit"), Key("space", "space", "pause")]
 >>> [[key.text for key in row] for row in key_rows(keys, 16)]
@@ -45,7 +45,7 @@ from tickrig.host.links.terminal import TerminalOutput
 from tickrig.host.text.page_text import in_cells
 
 Line = tuple[tuple[str, str], ...]
-"""Pieces of text, each with a style as `bold red`; empty for none."""
+"""Pieces of text, each with a style such as `bold red`, or an empty style."""
 
 
 def plain(text: str, style: str = "") -> Line:
@@ -59,34 +59,34 @@ def line_text(line: Line) -> str:
 
 
 def line_width(line: Line) -> int:
-    """Return how many cells a text takes; a wide character takes two cells."""
+    """Return the number of cells of a text. A wide character takes two cells."""
     return sum(cell_len(text) for text, _ in line)
 
 
 __all__ = ["Line", "LineView", "line_text", "plain"]
 
 _KEPT_STRIPS: Final = 1_000
-"""A few screens of lines, ready to be painted again."""
+"""Number of cached lines, which are a few screens of lines, ready to be painted again."""
 
 _HEIGHT_BITS: Final = 6
-"""The scroll bar is at most one part in 32 too long."""
+"""Bits of the height that are kept, so that the scroll bar is at most one part in 32 too long."""
 
 
 class LineView(ScrollView, can_focus=True):
-    """Shows lines; only changed lines are painted again.
+    """A view of lines, in which only changed lines are painted again.
 
     If there are many lines, the view needs only the lines around the visible ones.
 
     Attributes:
-        lines: the lines that the view has.
-        begin: the number of the first of these lines, counted from 0.
+        lines: lines that the view has.
+        begin: number of the first of these lines, counted from 0.
         follows: whether the last line stays visible, because the user has not scrolled up.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
 
     class Moved(Message):
-        """Lines are in view that are not there."""
+        """Message that lines became visible that the view does not have."""
 
     def __init__(self, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -99,31 +99,31 @@ class LineView(ScrollView, can_focus=True):
 
     @property
     def top(self) -> int:
-        """The number of the first line in view."""
+        """The number of the first visible line."""
         return int(self.scroll_offset.y)
 
     @property
     def rows(self) -> int:
-        """How many lines are in view."""
+        """The number of visible lines."""
         return int(self.scrollable_content_region.height)
 
     @property
     def at_end(self) -> bool:
-        """Whether the last line is in view."""
+        """Whether the last line is visible."""
         return self.top >= self.max_scroll_y
 
     @property
     def max_scroll_y(self) -> int:
-        """The number of the first line in view where the last one is in view, too."""
+        """The number of the first visible line when the last line is visible."""
         return max(0, self._total - self.rows)
 
     def show(self, lines: Sequence[Line], begin: int = 0, total: int | None = None) -> None:
         """Show lines.
 
         Args:
-            lines: the lines that the view gets.
-            begin: the number of the first of these lines.
-            total: the number of all lines; by default the number of `lines`.
+            lines: lines that the view gets.
+            begin: number of the first of these lines.
+            total: number of all lines. By default, it is the number of `lines`.
         """
         before, was = self.lines, self.begin
         self.lines, self.begin = list(lines), begin
@@ -141,7 +141,7 @@ class LineView(ScrollView, can_focus=True):
             self.refresh_lines(changed[0], changed[-1] + 1 - changed[0])
 
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
-        """Tell that lines came into view that are not there."""
+        """Post a message if lines became visible that the view does not have."""
         super().watch_scroll_y(old_value, new_value)
         if self._shown_rows == self.rows:  # else it was the window that got another size
             self.follows = self.at_end
@@ -150,17 +150,17 @@ class LineView(ScrollView, can_focus=True):
             self.post_message(self.Moved())
 
     def scroll_to(self, x: float | None = None, y: float | None = None, **how: Any) -> None:
-        """Scroll without animation; the next update of the screen would undo an animation."""
+        """Scroll without animation. The next update of the screen would undo an animation."""
         if y is not None and not how.get("force"):  # the user scrolls; the screen may be moving
             self.follows = y >= self.max_scroll_y
         super().scroll_to(x, y, **{**how, "animate": False})
 
     def show_end(self) -> None:
-        """Scroll to the last line, at once."""
+        """Scroll to the last line at once."""
         self.scroll_to(y=self.max_scroll_y, animate=False, immediate=True, force=True)
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """Return what is painted on lines of the screen."""
+        """Return the content of lines of the screen."""
         base, left, width = self.rich_style, int(self.scroll_offset.x), self.size.width
         if self._ground != (base, left, width):
             self._ground = base, left, width
@@ -168,7 +168,7 @@ class LineView(ScrollView, can_focus=True):
         return super().render_lines(crop)
 
     def render_line(self, y: int) -> Strip:
-        """Return what is painted on a line of the screen."""
+        """Return the content of a line of the screen."""
         line = self.line_at(self.top + y)
         strip = self._strips.get(line)
         if strip is None:
@@ -178,7 +178,7 @@ class LineView(ScrollView, can_focus=True):
         return strip
 
     def line_at(self, number: int) -> Line:
-        """Return a line by its number; an empty line if the view does not have this line."""
+        """Return a line by its number. The line is empty if the view does not have it."""
         return _at(self.lines, number - self.begin)
 
 
@@ -193,7 +193,7 @@ def rounded_up(total: int) -> int:
 
 
 def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
-    """Return a line as it is painted: from a given column on, padded to a given width."""
+    """Return the strip of a line, from a given column on, padded to a given width."""
     if line_width(line) != len(line_text(line)):
         whole = Strip([Segment(in_cells(text), _style_on(base, style)) for text, style in line])
         return whole.crop(left, left + width).adjust_cell_length(width, base)
@@ -211,7 +211,7 @@ def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
 
 @lru_cache
 def _style_on(base: Style, style: str) -> Style:
-    """Return a style on the ground of a widget."""
+    """Return a style on the background of a widget."""
     return base + Style.parse(style)
 
 
@@ -220,12 +220,12 @@ def _at(lines: Sequence[Line], place: int) -> Line:
 
 
 class Key(NamedTuple):
-    """A key.
+    """A key in the footer.
 
     Attributes:
-        name: its name in Textual.
-        shown: its displayed name.
-        description: what it does.
+        name: name of the key in Textual.
+        shown: displayed name of the key.
+        description: description of the key's action.
     """
 
     name: str
@@ -234,7 +234,7 @@ class Key(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What stands on the line."""
+        """Text of the key in the footer."""
         return f"{self.shown} {self.description}"
 
 
@@ -255,7 +255,7 @@ def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
 
 
 def key_at(row: Iterable[Key], column: int) -> Key | None:
-    """Return the key at a column of a line; None between two keys and after the last key."""
+    """Return the key at a column of a line, or None between two keys and after the last key."""
     for key in row:
         if 0 <= column < len(key.text):
             return key
@@ -264,7 +264,7 @@ def key_at(row: Iterable[Key], column: int) -> Key | None:
 
 
 class KeyFooter(Widget):
-    """Shows each key that is bound here and not hidden; a click presses it.
+    """A footer with each key that is bound here and not hidden. A click presses the key.
 
     The footer of Textual has one line, and cuts keys that do not fit.
     """
@@ -283,11 +283,11 @@ class KeyFooter(Widget):
         self.keys: list[Key] = []
 
     def on_mount(self) -> None:
-        """Show others when others are bound."""
+        """Update the footer when other keys are bound."""
         self.screen.bindings_updated_signal.subscribe(self, self._bound)
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """Return how many lines it takes."""
+        """Return the number of lines that the footer needs."""
         return len(key_rows(self.keys, width))
 
     def render_line(self, y: int) -> Strip:
@@ -299,7 +299,7 @@ class KeyFooter(Widget):
         return Strip(segments).adjust_cell_length(self.size.width, plain)
 
     def on_mouse_down(self, event: MouseDown) -> None:
-        """Press a key."""
+        """Press the key under the mouse."""
         if (key := key_at(self._row(event.y), event.x)) is not None:
             self.app.simulate_key(key.name)
 
@@ -313,7 +313,7 @@ class KeyFooter(Widget):
             self.call_later(self.refresh, layout=True)  # at once is forgotten at the start
 
     def _bound_here(self) -> Iterator[Key]:
-        """Give a key for each action of each owner, then that of the commands by name."""
+        """Yield a key for each action of each owner, and then the keys of the commands by name."""
         active, seen = self.screen.active_bindings, set()
         for owner, binding, _, _ in active.values():
             if binding.show and (owner, binding.action) not in seen:
@@ -336,13 +336,13 @@ _POSIX_DRIVER: Final = "LinuxDriver"
 
 
 class _Harmless(LineFilter):
-    """Replaces control codes in text for the terminal.
+    """A filter that replaces control codes in text for the terminal.
 
     The codes that Textual itself sends do not pass this filter.
     """
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
-        """Return pieces of as many characters, all of which are seen."""
+        """Return pieces with the same number of characters, all of which are visible."""
         return [
             piece
             if piece.control or piece.text.isprintable()
@@ -375,7 +375,7 @@ class FramedApp(App[None]):
 
     @contextmanager
     def ended_by_signals(self) -> Iterator[None]:
-        """Let signals end the app only, so that what follows it in the block is done too."""
+        """Make signals end only the app, so that the code after it in the block also runs."""
         with stopped_by_signals(self.end):
             yield
 
@@ -386,24 +386,24 @@ class FramedApp(App[None]):
             self._events.call_soon_threadsafe(self.exit)
 
     def on_mount(self) -> None:
-        """Let `end` reach the event loop."""
+        """Allow `end` to reach the event loop."""
         self._events = asyncio.get_running_loop()
         if self._ended:
             self.exit()
 
     def get_driver_class(self) -> type[Driver]:
-        """Return the driver of Textual, on POSIX with output that does not block."""
+        """Return the driver of Textual. On POSIX, its output does not block."""
         driver = super().get_driver_class()
         if driver.__name__ != _POSIX_DRIVER:
             return driver
         return type("FramedDriver", (_FramedDriver, driver), {})
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Return what all that is painted passes."""
+        """Return the filters that all painted text passes."""
         return [*super().get_line_filters(), _HARMLESS]
 
     def notify(self, message: str, **how: Any) -> None:
-        """Show a message; brackets in texts from files and devices are not markup."""
+        """Show a message. Brackets in texts from files and devices are not markup."""
         super().notify(message, **{**how, "markup": False})
 
     @property
@@ -412,22 +412,22 @@ class FramedApp(App[None]):
         return bool(self.screen_stack and self.screen.query("HelpPanel"))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Leave Escape to others where there is no help."""
+        """Pass Escape to other bindings if no help is shown."""
         return self.helps if action == "leave_help" else super().check_action(action, parameters)
 
     def action_help(self) -> None:
-        """Show or hide what the keys do here."""
+        """Show or hide the help on the keys."""
         if self.helps:
             self.action_leave_help()
         else:
             self.action_show_help_panel()
 
     def action_leave_help(self) -> None:
-        """Hide what the keys do."""
+        """Hide the help on the keys."""
         self.action_hide_help_panel()
 
     def paint_anew(self) -> None:
-        """Paint all of the screen, as a terminal wants that has missed something."""
+        """Paint the whole screen again, for a terminal that has lost output."""
         self.refresh(layout=True)
 
 
@@ -442,7 +442,7 @@ class _FramedDriver(Driver):
         self._framed = app
 
     def start_application_mode(self) -> None:
-        """Take the terminal."""
+        """Switch the terminal to the application."""
         app = self._framed
         self._output = TerminalOutput(
             sys.__stderr__.fileno() if sys.__stderr__ else 2,
@@ -463,7 +463,7 @@ class _FramedDriver(Driver):
         super().stop_application_mode()  # type: ignore[safe-super] # of Textual's driver
 
     def close(self) -> None:
-        """End the output; drop the remaining output if the terminal does not accept it."""
+        """End the output. Drop the remaining output if the terminal does not accept it."""
         super().close()
         if self._output is not None and not self._output.close():
             give_up_terminals()

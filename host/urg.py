@@ -1,4 +1,4 @@
-"""A SCIP host that never blocks: it sends a request, and fetches the scans later."""
+"""A SCIP host that never blocks. It sends a request, and fetches the scans later."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class UrgScan:
         time_ms: timer of the sensor at the start of the turn, 24 bits.
         first: step of the first distance.
         cluster: number of steps for each distance.
-        distances_mm: the distances as received; a value below DMIN is a code, not a distance.
-        specification: limits and steps of the sensor.
+        distances_mm: distances in mm as received. A value below DMIN is a code, not a distance.
+        specification: specification of the sensor with limits and steps.
     """
 
     time_ms: int
@@ -32,12 +32,12 @@ class UrgScan:
     specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
-        """Return the direction of a number, from straight ahead to the left."""
+        """Return the direction of a distance by its number, from straight ahead to the left."""
         step = self.first + place * self.cluster + (self.cluster - 1) / 2
         return (step - self.specification.front) * tau / self.specification.resolution
 
     def points(self) -> Iterator[tuple[float, float]]:
-        """Yield direction in rad and distance in m, where there is one."""
+        """Yield direction in rad and distance in m for each valid distance."""
         low, high = self.specification.nearest_mm, self.specification.farthest_mm
         for place, distance_mm in enumerate(self.distances_mm):
             if low <= distance_mm <= high:
@@ -45,26 +45,26 @@ class UrgScan:
 
 
 _SILENCE_US: Final = 500_000
-"""Longest time without a valid scan: five turns; longer if scans are skipped."""
+"""Longest time without a valid scan, which is five turns, or longer if scans are skipped."""
 
 _ENDLESS: Final = 0
 _LEAVE_ADJUST: Final = "2"
 
 
 class UrgClient:
-    """Reads the type of the sensor, starts continuous measurement, and receives its scans.
+    """A client that reads the type of the sensor, starts continuous measurement, and takes scans.
 
     The client first sends SCIP2.0, for a sensor in SCIP 1.1. It then sends TM2 and QT to stop a
     measurement that an earlier host has started. If no valid scan arrives within the time of five
     scans, the client starts again. A garbled scan is skipped.
 
     Args:
-        link: the line.
-        cluster: steps per value, 1..99.
-        interval: scans that are skipped after each one, 0..9.
+        link: line to the sensor.
+        cluster: number of steps per distance, 1..99.
+        interval: number of scans that are skipped after each scan, 0..9.
 
     Attributes:
-        specification: the specification that the sensor sent, None before it arrives.
+        specification: specification that the sensor sent, or None before it arrives.
         garbled: number of garbled replies and scans.
         restarts: number of restarts.
     """
@@ -77,7 +77,7 @@ class UrgClient:
 
     @property
     def garbled(self) -> int:
-        """Replies and scans that were none."""
+        """Number of garbled replies and scans."""
         return self._spoilt + self._splitter.garbled
 
     def poll(self) -> list[UrgScan]:
@@ -100,7 +100,7 @@ class UrgClient:
         return scans
 
     def close(self) -> None:
-        """Switch the laser off, and give the line back."""
+        """Switch the laser off, and release the line."""
         self._link.send(scip.Command("QT").encode())
         self._link.close()
 

@@ -1,6 +1,6 @@
-"""Options of a CAN bus, as in the tools of python-can, and the bus itself.
+"""Options of a CAN bus as in the tools of python-can, and the bus itself.
 
-python-can is imported when a bus is opened: it takes a fifth of a second.
+python-can is imported only when a bus is opened, because the import takes a fifth of a second.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ class BusOptions:
 
 
 def parse_bit_rate(text: str) -> int:
-    """Read a bit rate: 500000, 500k, 1M.
+    """Read a bit rate such as 500000, 500k or 1M.
 
     Raises:
-        ValueError: it is not a bit rate.
+        ValueError: the text is not a bit rate.
 
     >>> parse_bit_rate("500k"), parse_bit_rate("1M"), parse_bit_rate("125000")
     (500000, 1000000, 125000)
@@ -82,7 +82,7 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
     name = "bit rate"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Read it."""
+        """Read a bit rate."""
         try:
             return parse_bit_rate(str(value))
         except ValueError as error:
@@ -158,7 +158,10 @@ bus_options: Final[Decorator] = add_options(
         help="Further driver options, such as port=43113.",
     ),
 )
-"""Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
+"""Decorator that adds the fields of `BusOptions` as options.
+
+The command's class is `BusCommand`.
+"""
 
 
 fd_options: Final[Decorator] = add_options(
@@ -170,22 +173,22 @@ fd_options: Final[Decorator] = add_options(
         help="Data bit rate of CAN FD frames with BRS; for the load, and with --fd for the driver.",
     ),
 )
-"""Add the CAN FD fields of `BusOptions`, besides `bus_options`."""
+"""Decorator that adds the CAN FD fields of `BusOptions`, in addition to `bus_options`."""
 
 
 def bus_and_rest(
     words: Sequence[str], channel: str | None, rest: str, most: int | None = None
 ) -> tuple[str | None, list[str]]:
-    """Separate the BUS of a command from the words after it; with -c there is no BUS.
+    """Separate the BUS of a command from the words after it. With -c, there is no BUS.
 
     Args:
-        words: the arguments.
-        channel: value of -c.
+        words: arguments of the command.
+        channel: value of -c, or None.
         rest: name of the words after BUS, for messages.
-        most: largest number of these.
+        most: maximum number of words after BUS.
 
     Returns:
-        The BUS, None if -c names it, and the rest.
+        The BUS, or None if -c names the bus, and the remaining words.
 
     Raises:
         click.UsageError: an argument is missing, or there are too many.
@@ -203,14 +206,14 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     """Open a bus as a python-can object.
 
     Args:
-        options: the bus.
-        instead: what can be given instead of a bus, for the message.
+        options: options of the bus.
+        instead: words that the user can give instead of a bus, used in the message.
 
     Returns:
         The bus, its interface and its channel.
 
     Raises:
-        Refused: no bus is given; SourceFailed: the bus cannot be opened.
+        Refused: no bus is given. SourceFailed: the bus cannot be opened.
     """
     with loading():
         import can  # noqa: PLC0415 - slow
@@ -252,7 +255,7 @@ def _let_go(error: Exception) -> None:
 
 
 def check_interface(interface: str | None) -> None:
-    """Refuse an interface that python-can does not have."""
+    """Raise Refused for an interface that python-can does not have."""
     if interface is not None and interface not in (names := _interfaces()):
         from tickrig.host.text.names import closest  # noqa: PLC0415 - only for mistakes
 

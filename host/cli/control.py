@@ -1,4 +1,4 @@
-"""Requests of command lines over a control socket."""
+"""Requests of commands over a control socket."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
     """Make one request and return its answer.
 
     Args:
-        socket: the control socket.
-        whom: the expected server, for messages: `emulator` or `system`.
-        do: the verb of the request.
-        fields: the other fields of the request.
+        socket: control socket of the server.
+        whom: name of the expected server in messages, `emulator` or `system`.
+        do: verb of the request.
+        fields: other fields of the request.
 
     Raises:
         Refused: the server does not answer, or answers with an error.
@@ -39,7 +39,7 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
 
 @contextmanager
 def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
-    """Raise Refused in place of errors of a `ControlClient`; see `request` for the arguments."""
+    """Raise Refused in place of errors of a `ControlClient`. `request` describes the arguments."""
     try:
         yield
     except TimeoutError:
@@ -55,10 +55,10 @@ def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
 
 
 class _Waiting(Protocol):
-    """An object that serves requests while it waits: a `ServingClock`, the loop of a server.
+    """An object that serves requests while it waits, such as a `ServingClock` or a server loop.
 
     Attributes:
-        serve: called with the time in microseconds that it may take.
+        serve: function that is called with the time in microseconds that it may take.
     """
 
     serve: Callable[[int], None] | None
@@ -83,9 +83,9 @@ def serving_control(
     """Serve a control socket whenever the clock waits, and yield the server.
 
     Args:
-        path: of the socket.
-        dispatcher: answers the requests.
-        clock: clock of the run; it serves the socket while it waits.
+        path: path of the socket.
+        dispatcher: dispatcher that answers the requests.
+        clock: clock of the run, which serves the socket while it waits.
 
     Raises:
         Refused: the socket cannot be made.

@@ -1,4 +1,4 @@
-"""Options that connect a system with other middleware, the same for all commands."""
+"""Options that connect a system with other middleware, which are the same for all commands."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class Endpoint:
     rtshell can do.
 
     Attributes:
-        host: an IP address or a host name.
-        port: TCP port; 0 selects a free port.
+        host: IP address or host name.
+        port: TCP port. 0 selects a free port.
     """
 
     host: str = "127.0.0.1"
     port: int = 0
 
     def __str__(self) -> str:
-        """Return it in the usual notation."""
+        """Return the endpoint in the usual notation."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}" if self.port else host
 
@@ -58,8 +58,8 @@ class OpenRtmOptions:
     """Settings of a process in an OpenRTM system.
 
     Attributes:
-        name_server: address of its name server.
-        endpoint: address for peers.
+        name_server: address of the name server.
+        endpoint: address at which peers can connect.
         names: format of component names in the name server.
     """
 
@@ -69,10 +69,10 @@ class OpenRtmOptions:
 
 
 def _parse_openrtm(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
-    """Read the words of a command line; the word of an omitted option is empty.
+    """Read the words of a command line. The word of an omitted option is empty.
 
     Raises:
-        ValueError: an invalid word; the message starts with the name of its option.
+        ValueError: a word is invalid. The message starts with the name of its option.
     """
     return OpenRtmOptions(
         _parse_endpoint("--openrtm", name_server, _PORT),
@@ -85,21 +85,21 @@ def format_name(pattern: str, values: Mapping[str, str]) -> str:
     """Make the path of a component from one of OpenRTM's `naming.formats`.
 
     Args:
-        pattern: such as `%h.host_cxt/%n.rtc`; `%%` is a percent sign.
-        values: by letter.
+        pattern: format such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
+        values: values by letter.
 
     >>> format_name("%h.host_cxt/%n.rtc", {"h": "robot", "n": "ConsoleIn0"})
     'robot.host_cxt/ConsoleIn0.rtc'
 
     Raises:
-        KeyError: a letter without a value.
+        KeyError: a letter has no value.
     """
     filled = {letter: value.replace("/", "_") for letter, value in values.items()} | {"%": "%"}
     return re.sub(r"%(.?)", lambda match: filled[match[1]], pattern)
 
 
 def parse_endpoint(text: str, port: int = _PORT) -> Endpoint:
-    """Read `HOST:PORT`, `HOST` or `[ADDRESS]:PORT`; without a port, use the default port.
+    """Read `HOST:PORT`, `HOST` or `[ADDRESS]:PORT`. Without a port, use the default port.
 
     >>> parse_endpoint("robot"), parse_endpoint("[::1]:2810")
     (Endpoint(host='robot', port=2809), Endpoint(host='::1', port=2810))
@@ -170,8 +170,8 @@ class EngineOptions:
     """Engines requested on a command line.
 
     Attributes:
-        openrtm: OpenRTM, or None.
-        ros2: ROS 2, or None.
+        openrtm: settings of OpenRTM, or None.
+        ros2: settings of ROS 2, or None.
     """
 
     openrtm: OpenRtmOptions | None = None
@@ -183,14 +183,14 @@ class EngineOptions:
 
 
 def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
-    """Remove the options of engines from those of a command.
+    """Remove the options of engines from the options of a command.
 
     Args:
-        options: of the command line, by name.
-        topics: default table of topics; if empty, all ports have a topic.
+        options: options of the command line by name.
+        topics: default table of topics. If it is empty, all ports have a topic.
 
     Raises:
-        Refused: options of an engine that is not requested, or invalid ones.
+        Refused: an option belongs to an engine that is not requested, or is invalid.
     """
     return EngineOptions(_take_openrtm(options), _take_ros2(options, topics))
 
@@ -229,7 +229,7 @@ def _take_ros2(options: dict[str, Any], topics: str) -> Ros2Options | None:
 
 _DOMAIN_VARIABLE: Final = "ROS_DOMAIN_ID"
 _LAST_DOMAIN: Final = 232
-"""Highest domain with ports (DDSI-RTPS, 9.6.2)."""
+"""Highest domain number that has ports (DDSI-RTPS, 9.6.2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,10 +237,10 @@ class Ros2Options:
     """Settings of a system in ROS 2.
 
     Attributes:
-        domain: the DDS domain, 0..232.
-        interface: network interface of this machine, such as eth0; loopback if empty.
-        table: file with the table of ports and topics; None for the table of the command.
-        topics: text of the table of the command; if empty, each port has a topic.
+        domain: DDS domain, 0..232.
+        interface: network interface of this machine, such as eth0, or loopback if it is empty.
+        table: file with the table of ports and topics, or None for the table of the command.
+        topics: text of the table of the command. If it is empty, each port has a topic.
     """
 
     domain: int = 0
@@ -252,7 +252,7 @@ class Ros2Options:
 def _parse_ros2(
     domain: int | None, interface: str | None, table: Path | None, topics: str
 ) -> Ros2Options:
-    """Return the options; the default domain is ROS_DOMAIN_ID, or 0.
+    """Return the options. The default domain is ROS_DOMAIN_ID, or 0.
 
     Raises:
         ValueError: the variable is not a domain.

@@ -1,4 +1,4 @@
-"""Extensions by installed packages: entry points, read when needed (docs/howto/extending.md)."""
+"""Extensions in installed packages, which are entry points (docs/howto/extending.md)."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ T = TypeVar("T")
 
 
 class ExtensionError(ValueError):
-    """A missing or unusable extension; the message is one line."""
+    """A missing or unusable extension. The message is one line."""
 
 
 @dataclass(frozen=True)
 class ExtensionGroup(Generic[T]):
-    """One entry-point group: built-in members and members of other packages.
+    """One entry-point group, with built-in members and members of other packages.
 
     No module is imported, and no metadata is read, before the first access. Built-in members need
     no installation. An entry point with the name of a built-in member does not replace that member.
 
     Args:
-        name: of the group, such as `tickrig.devices`.
-        what: noun for its members in messages, such as `device`.
-        built_in: built-in members by name, each as `MODULE:NAME`.
-        accepts: returns whether an object may be a member.
+        name: name of the group, such as `tickrig.devices`.
+        what: noun for the members in messages, such as `device`.
+        built_in: built-in members by name, in the form `MODULE:NAME`.
+        accepts: function that returns whether an object may be a member.
         wanted: description of members, such as `a DeviceType`.
     """
 
@@ -42,14 +42,14 @@ class ExtensionGroup(Generic[T]):
     wanted: str
 
     def names(self) -> list[str]:
-        """Return all names, built-in ones first, without loading anything."""
+        """Return all names without loading anything. Built-in names are first."""
         return [*self.built_in, *sorted({point.name for point in self._foreign()})]
 
     def load(self, name: str) -> T:
-        """Return the member of this name.
+        """Return the member with a name.
 
         Raises:
-            ExtensionError: unknown name, or it cannot be loaded.
+            ExtensionError: the name is unknown, or the member cannot be loaded.
         """
         if name in self.built_in:
             return self._checked(f"{self.what} {name!r}", self.built_in[name])
@@ -59,10 +59,10 @@ class ExtensionGroup(Generic[T]):
         raise ExtensionError(f"no {self.what} {name!r}; {near(name, self.names())}")
 
     def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Return all members by name; omit and report those that cannot be loaded.
+        """Return all members by name. Omit and report members that cannot be loaded.
 
         Args:
-            notify: called with each report.
+            notify: function that is called with each report.
         """
         return {name: self.load(name) for name in self.built_in} | self.load_foreign(notify)
 

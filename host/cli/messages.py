@@ -1,4 +1,4 @@
-"""Messages of commands on standard error: remarks, warnings, refusals."""
+"""Messages of commands on standard error, which are remarks, warnings and refusals."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ NEEDS_YAML: Final = "a System Definition needs PyYAML: pip install 'tickrig[rtc]
 
 
 class Refused(click.ClickException):
-    """One line on standard error, and exit status 2."""
+    """A refusal, printed as one line on standard error, with exit status 2."""
 
     exit_code = 2
 
 
 class SourceFailed(click.ClickException):
-    """One line on standard error, and exit status 3: a bus, a file or a disk failed."""
+    """A failure of a bus, a file or a disk: one line on standard error, and exit status 3."""
 
     exit_code = 3
 
@@ -46,7 +46,7 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Raise ClickException (exit status 1) in place of these errors.
 
-    For an error whose `status` is 3, raise SourceFailed instead; `status` is the exit status of a
+    For an error whose `status` is 3, raise SourceFailed instead. `status` is the exit status of a
     process that this command started. An error of standard output is not changed.
     """
     try:
@@ -66,11 +66,11 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 
 @contextmanager
 def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[None]:
-    """Raise Refused in place of an error of the block; for an OSError, as `refuse_path` does.
+    """Raise Refused in place of an error of the block. An OSError is handled as in `refuse_path`.
 
     Args:
-        what: the invalid option or argument, which starts the message.
-        wrong: the error; its text is the message.
+        what: invalid option or argument, which starts the message.
+        wrong: class of the error, whose text is the message.
     """
     try:
         yield
@@ -81,7 +81,10 @@ def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[N
 
 
 def time_us(option: str, word: str) -> int:
-    """Read the time of an option such as `--wait`, in microseconds; Refused if it is invalid."""
+    """Read the time of an option such as `--wait` in microseconds.
+
+    Raise Refused if it is invalid.
+    """
     from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none
 
     with refused_at(option):
@@ -92,15 +95,15 @@ def time_us(option: str, word: str) -> int:
 
 
 def say(text: str) -> None:
-    """Print a message on standard error; standard output is for programs."""
+    """Print a message on standard error, because standard output is for programs."""
     click.echo(text, err=True)
 
 
 @contextmanager
 def warnings_shown() -> Iterator[None]:
-    """Show warnings of the library on standard error, one line each.
+    """Show warnings of the library on standard error, one line per warning.
 
-    Without this context manager the library prints no warnings.
+    Without this context manager, the library prints no warnings.
     """
     import logging  # noqa: PLC0415 - slow, and a TAB needs none
 
@@ -114,7 +117,7 @@ def warnings_shown() -> Iterator[None]:
 
 
 def show_findings(findings: Iterable[Finding]) -> None:
-    """Print the findings in EDS files; print a finding that occurs in many sections only once."""
+    """Print the findings in EDS files. Print a finding in many sections only once."""
     from tickrig.wire.canopen.eds.eds_file import finding_lines  # noqa: PLC0415 - a TAB needs none
 
     for line in finding_lines(findings):

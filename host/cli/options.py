@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class HarmlessCommand(click.Command):
-    """A console command; terminals do not interpret control characters in its output."""
+    """A console command. Terminals do not interpret control characters in its output."""
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run the command."""
@@ -60,10 +60,10 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 def refuse_idle(why: str, *names: str) -> None:
-    """Refuse options that were given to the current command but have no effect.
+    """Raise Refused for options that the user gave to the current command but that have no effect.
 
     Args:
-        why: the reason why they have no effect, such as `--jsonl has its own times`.
+        why: reason why the options have no effect, such as `--jsonl has its own times`.
         names: names of the parameters.
     """
     from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
@@ -76,7 +76,7 @@ def refuse_idle(why: str, *names: str) -> None:
 
 
 class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type there
-    """One of a list of words; the message about an unknown word suggests the nearest one."""
+    """One of a list of words. The message about an unknown word suggests the nearest word."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read a word."""
@@ -91,7 +91,7 @@ class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type th
 
 
 class NumberRange(click.FloatRange):
-    """A number in a range; NaN is refused."""
+    """A number in a range. NaN is refused."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -104,7 +104,7 @@ class NumberRange(click.FloatRange):
 
 
 class _NodeId(click.IntRange):
-    """A node-ID 1..127, as `5`."""
+    """A node-ID in 1..127, such as `5`."""
 
     def __init__(self) -> None:
         super().__init__(1, 127)
@@ -120,12 +120,15 @@ NODE_ID: Final = _NodeId()
 
 
 def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds `--version`, in the form that all commands have."""
+    """Return a decorator that adds `--version` in the form that all commands have."""
     return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
 
 
 def time_option(option: str, name: str, **attributes: Any) -> Decorator:
-    """Return an option for a time such as `10s`; its value is in microseconds, None by default."""
+    """Return an option for a time such as `10s`.
+
+    Its value is in microseconds, or None by default.
+    """
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
         from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
@@ -157,8 +160,8 @@ def works_in(path: str) -> Decorator:
     has the same signature and an empty body.
 
     Args:
-        path: location of the function that does the work, as `MODULE:NAME`. The function returns
-            the exit status; None means 0.
+        path: location of the function that does the work, in the form `MODULE:NAME`. The function
+            returns the exit status. None means 0.
     """
 
     def decorate(described: Callable[..., Any]) -> Callable[..., Any]:
@@ -179,9 +182,9 @@ class LazyCommand(click.Command):
     """Placeholder in lists for a command that is not imported yet.
 
     Args:
-        name: of the command.
-        path: location of the command, as `MODULE:NAME`.
-        short_help: first sentence of its help.
+        name: name of the command.
+        path: location of the command, in the form `MODULE:NAME`.
+        short_help: first sentence of the command's help.
     """
 
     def __init__(self, name: str, path: str, short_help: str) -> None:
@@ -193,8 +196,8 @@ class LazyGroup(HarmlessCommand, click.Group):
     """A group whose commands are in separate modules.
 
     Args:
-        commands: path and short help of each command, by its name, in the order of the list.
-        attributes: arguments of any click group.
+        commands: path and short help of each command by name, in the order of the list.
+        attributes: arguments of the click group.
     """
 
     def __init__(self, commands: Mapping[str, tuple[str, str]], **attributes: Any) -> None:

@@ -1,7 +1,7 @@
 """Start and end a command, also by Ctrl-C, `kill`, a closed terminal or a full disk.
 
 All commands start here. While a command is being loaded, a signal ends the process at once.
-Afterwards Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that the command
+Afterwards, Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that the command
 can clean up.
 
 Data from files, buses and serial lines may contain control characters that a terminal would
@@ -28,23 +28,23 @@ from types import FrameType
 from typing import Any, Final, TextIO
 
 INTERRUPTED: Final = 128 + signal.SIGINT
-"""Exit status that shells give a program which Ctrl-C ended."""
+"""Exit status that shells give a program that Ctrl-C ended."""
 
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
-"""What a full disk says, a terminal that is gone, and a file that was opened to be read alone."""
+"""Error codes for a full disk, a lost terminal, and a file that is open only for reading."""
 
 UNWRITTEN: Final = 3
-"""Exit status where standard output takes nothing more."""
+"""Exit status if standard output accepts no more data."""
 
 _IMPORTER: Final = "<frozen importlib._bootstrap"
-"""How the file names of Python's own importer begin."""
+"""Beginning of the file names of Python's own importer."""
 
 _AGAIN_S: Final = 0.01
 _MOST_REPEATS: Final = 200
-"""An import that takes longer than these is interrupted."""
+"""Number of repetitions of a signal after which a long import is interrupted."""
 
 _TERMINAL_MS: Final = 500
-"""A terminal that takes nothing for so long is given up when a signal ends the command."""
+"""Time without accepted data after which a terminal is given up when a signal ends the command."""
 
 _Handler = Callable[[int, FrameType | None], None]
 
@@ -53,8 +53,8 @@ def start(name: str, path: str) -> None:
     """Run a command as a console script.
 
     Args:
-        name: the name that users type.
-        path: the location of the command, as `MODULE:NAME`.
+        name: name that users type.
+        path: location of the command, in the form `MODULE:NAME`.
     """
     command: Any = load(path)
     status: Any = 0
@@ -95,7 +95,7 @@ def _status_of(interrupt: KeyboardInterrupt) -> int:
 def _open_closed_streams() -> None:
     """Open the standard streams that the caller has closed, as `>&-` does.
 
-    Otherwise the next file or socket would get the descriptor of a closed stream, and messages
+    Otherwise, the next file or socket would get the descriptor of a closed stream, and messages
     would be written into it. A standard input opened here is empty. Text written to a standard
     output or standard error opened here is dropped, and the exit status does not change.
     """
@@ -116,19 +116,19 @@ def _open_closed_streams() -> None:
 
 
 _PLAIN: Final = bytes((ord("\n"), *range(0x20, 0x7F)))
-"""ASCII that is harmless to a terminal."""
+"""ASCII characters that are harmless to a terminal."""
 
 
 class _HarmlessStream(io.TextIOWrapper):
-    """Standard output or error; replaces control characters by visible symbols.
+    """Standard output or standard error with visible symbols in place of control characters.
 
     Args:
-        stream: the stream to write to; it may also be used directly.
-        drops: whether to drop text that does not fit on a full disk; otherwise writing raises
+        stream: stream to write to. Other code may also use the stream directly.
+        drops: whether to drop text that does not fit on a full disk. Otherwise writing raises
             OSError.
 
     Attributes:
-        as_is: the stream that was passed in.
+        as_is: stream that was passed in.
     """
 
     def __init__(self, stream: TextIO, *, drops: bool = False) -> None:
@@ -143,7 +143,7 @@ class _HarmlessStream(io.TextIOWrapper):
         )
 
     def write(self, text: str, /) -> int:
-        """Write text for people."""
+        """Write text for the user."""
         # of ASCII, bytes are looked at: a twentieth of the time of looking at characters
         ascii_bytes = text.encode("ascii") if text.isascii() else b"\0"
         if ascii_bytes.translate(None, _PLAIN) and not text.replace("\n", "").isprintable():
@@ -188,7 +188,7 @@ def as_is(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Provide all three standard streams during the block; they replace control characters.
+    """Provide all three standard streams during the block. They replace control characters.
 
     If standard error is a file on a full disk, the command continues. The messages are dropped, and
     the exit status does not change.
@@ -224,7 +224,7 @@ def raise_of_output(error: Exception) -> None:
 
 
 def load(path: str) -> Any:
-    """Return what stands at `MODULE:NAME`."""
+    """Return the object at `MODULE:NAME`."""
     module, _, name = path.partition(":")
     with loading():
         return getattr(import_module(module), name)
@@ -234,7 +234,7 @@ def load(path: str) -> Any:
 def loading() -> Iterator[None]:
     """Make Ctrl-C end the process at once, while there is nothing to clean up.
 
-    Other handlers of Ctrl-C are kept; threads are not affected.
+    Other handlers of Ctrl-C are kept. Threads are not affected.
     """
     handler = signal.getsignal(signal.SIGINT)
     owner = getattr(handler, "__self__", None)
@@ -250,21 +250,21 @@ def loading() -> Iterator[None]:
 
 
 class Interrupter:
-    """Raises KeyboardInterrupt after a signal, but not in the middle of an import.
+    """A handler that raises KeyboardInterrupt after a signal, but not during an import.
 
     An exception in the middle of an import may be lost in a callback of the importer, or leave a
     module half loaded. Therefore the signal is repeated until the import has ended, for two seconds
     at most.
 
     Attributes:
-        pending: number of a signal that is being repeated, 0 if none is.
+        pending: number of a signal that is being repeated, or 0 if none is.
     """
 
     def __init__(self) -> None:
         self.pending = self._repeats = 0
 
     def received(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal; the argument of the KeyboardInterrupt is the number of the signal."""
+        """Handle a signal. The argument of the KeyboardInterrupt is the number of the signal."""
         give_up_terminals()
         if _is_importing(frame) and self._repeats < _MOST_REPEATS:
             self._repeat(number)
@@ -274,7 +274,7 @@ class Interrupter:
 
     @contextmanager
     def repeating(self) -> Iterator[None]:
-        """Repeat signals whose exception Python can only report, as one raised in a `__del__`."""
+        """Repeat signals whose exception Python can only report, such as one in a `__del__`."""
         before = sys.unraisablehook
 
         def unraisable(lost: sys.UnraisableHookArgs, /) -> None:

@@ -1,4 +1,4 @@
-"""Client of a control socket: sends requests to a running emulator."""
+"""Client of a control socket, which sends requests to a running emulator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TIMEOUT_S: Final = 5.0
 
 
 class ControlRefused(ValueError):  # noqa: N818 - what the emulator did
-    """The emulator refused a request; the message has the reason."""
+    """The emulator refused a request. The message contains the reason."""
 
 
 class ControlClient:
@@ -24,7 +24,7 @@ class ControlClient:
 
     Args:
         path: path of the socket.
-        timeout_s: time-out of an answer.
+        timeout_s: time to wait for an answer.
 
     Raises:
         OSError: no server listens at the path, or the server does not answer.
@@ -44,7 +44,7 @@ class ControlClient:
         """Make a request and return its answer.
 
         Raises:
-            ControlRefused: the emulator refused it.
+            ControlRefused: the emulator refused the request.
             OSError: the emulator does not answer, or has closed the connection.
             ValueError: the answer is invalid.
         """

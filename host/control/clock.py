@@ -7,26 +7,26 @@ from collections.abc import Callable
 
 
 class RealClock:
-    """The monotonic clock of this machine; it starts with the first wait."""
+    """The monotonic clock of this machine, which starts with the first wait."""
 
     def __init__(self) -> None:
         self._start_ns: int | None = None
 
     @property
     def now_us(self) -> int:
-        """Time since the first wait, 0 before it."""
+        """Time since the first wait, or 0 before it."""
         if self._start_ns is None:
             return 0
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, t_us: int, /) -> int:
-        """Sleep until a time; a late rig catches up without skipping ticks.
+        """Sleep until a time. A late rig catches up without skipping ticks.
 
         Args:
             t_us: time since the first wait.
 
         Returns:
-            The delay in us.
+            The delay of the end of the wait in us.
         """
         if self._start_ns is None:
             self._start_ns = time.monotonic_ns()
@@ -41,14 +41,14 @@ class ServingClock(RealClock):
     """The monotonic clock of this machine, which serves requests while it waits.
 
     Attributes:
-        serve: called with the time in microseconds that it may take. It is called at least once for
-            each wait, so that a run that is late can be stopped.
+        serve: function that is called with the time in microseconds that it may take. It is called
+            at least once for each wait, so that a run that is late can be stopped.
     """
 
     serve: Callable[[int], None] | None = None
 
     def wait_until(self, t_us: int, /) -> int:
-        """Serve, then sleep until `t_us`."""
+        """Serve requests, then sleep until `t_us`."""
         if self.serve is not None:
             self.serve(0)
             while (early_us := t_us - self.now_us) > 0 and self.now_us:

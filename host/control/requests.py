@@ -1,4 +1,4 @@
-"""Requests and their answers: one JSON object a line (docs/reference/bench/control.md)."""
+"""Requests and their answers, with one JSON object per line (docs/reference/bench/control.md)."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ Object = dict[str, object]
 """A JSON object."""
 
 _Verb = tuple[Callable[[Object], Object], tuple[str, ...]]
-"""Handler of a request, and its fields."""
+"""Function that handles a request, and the fields of the request."""
 
 _COMMON_FIELDS: Final = ("v", "do", "id")
 _NOT_JSON: Final = "the line is not a JSON object"
 
 
 class RequestDispatcher:
-    """Answers requests by a table of verbs; a bad request changes nothing.
+    """A dispatcher that answers requests by a table of verbs. An invalid request changes nothing.
 
     Args:
-        verbs: by the value of `do` in a request. A verb raises ValueError to refuse.
+        verbs: verbs by the value of `do` in a request. A verb raises ValueError to refuse.
     """
 
     def __init__(self, verbs: Mapping[str, _Verb]) -> None:
@@ -43,7 +43,7 @@ class RequestDispatcher:
             return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
-        """Answer a request: `ok`, and the result or `error`."""
+        """Return the answer to a request: `ok`, and the result or `error`."""
         head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
@@ -72,12 +72,12 @@ def _refusal(error: str) -> Object:
 
 
 def refusal_line(error: str) -> bytes:
-    """Return that answer as a line."""
+    """Return the answer to a refused request as a line."""
     return _encode(_refusal(error))
 
 
 def text_of(request: Mapping[str, object], key: str) -> str:
-    """Return a string field; ValueError if it is not a string."""
+    """Return a string field. Raise ValueError if it is not a string."""
     value = request.get(key)
     if not isinstance(value, str):
         raise ValueError(f"{key} is a string, not {short(value)}")
@@ -85,7 +85,7 @@ def text_of(request: Mapping[str, object], key: str) -> str:
 
 
 def whole(value: object, key: str, low: int, high: int) -> int:
-    """Return a whole number; ValueError if it is not one, or not in `low` to `high`."""
+    """Return a whole number. Raise ValueError if it is not whole, or not in `low` to `high`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{key} is a whole number, not {short(value)}")
     if not low <= value <= high:
@@ -94,7 +94,7 @@ def whole(value: object, key: str, low: int, high: int) -> int:
 
 
 def short(value: object) -> str:
-    """Return a received value as JSON, truncated to a sensible length."""
+    """Return a received value as JSON, truncated to a readable length."""
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:60]}..."
 

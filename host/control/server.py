@@ -1,4 +1,4 @@
-"""A control socket."""
+"""A server for a control socket."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ MAX_CLIENTS: Final = 32
 MAX_UNSENT: Final = 262_144
 _READ_BYTES: Final = 4_096
 IDLE_S: Final = 60.0
-"""Idle time after which a client makes room for another if all places are taken."""
+"""Idle time after which a client makes room for another client if all places are taken."""
 
 Answer = Callable[[bytes], bytes]
-"""Answers a line. The line is passed without its line end; the answer has a line end."""
+"""Function that answers a line. The line has no line end, and the answer has a line end."""
 
 
 class _Readable(Protocol):
@@ -65,17 +65,17 @@ class _Readable(Protocol):
 
 
 class LineServer:
-    """Serves a listening socket whenever `serve` is called.
+    """A server for a listening socket, which works whenever `serve` is called.
 
     In each round the server answers at most one line of each client. It stops reading requests of a
     client that does not read its answers.
 
     Args:
-        listener: non-blocking; closed by the server.
-        begin: called for each new client; returns the handler of its lines.
-        refuse: makes an answer with the reason of a refusal.
-        max_line: longest line, in bytes.
-        clock: monotonic time in seconds.
+        listener: non-blocking listening socket, which the server closes.
+        begin: function that is called for each new client, and returns the handler of its lines.
+        refuse: function that makes an answer with the reason of a refusal.
+        max_line: length of the longest line in bytes.
+        clock: function that returns monotonic time in seconds.
     """
 
     def __init__(
@@ -92,16 +92,16 @@ class LineServer:
         self._attached: dict[_Readable, Callable[[], None]] = {}
 
     def attach(self, source: _Readable, ready: Callable[[], None]) -> None:
-        """Serve another source, too.
+        """Serve another source in addition.
 
         Args:
-            source: object with a descriptor; -1 after closing.
-            ready: called in a round in which it can be read.
+            source: object with a descriptor, which is -1 after closing.
+            ready: function that is called in a round in which the source can be read.
         """
         self._attached[source] = ready
 
     def serve(self, wait_us: int) -> None:
-        """Run one round; wait for work, but not longer than `wait_us`."""
+        """Run one round. Wait for work at most `wait_us`."""
         clients = self._clients.values()
         readers = [client.connection for client in clients if client.wants_more]
         writers = [client.connection for client in clients if client.has_unsent]
@@ -148,7 +148,7 @@ class LineServer:
         _dismiss(connection, self._refuse(f"there are {MAX_CLIENTS} clients already"))
 
     def _make_room(self) -> None:
-        """Close the connection of the longest idle client, if it was idle long enough."""
+        """Close the connection of the client that is idle longest, if it was idle long enough."""
         client = min(self._clients.values(), key=lambda client: client.active_s)
         if self._clock() - client.active_s >= IDLE_S:
             del self._clients[client.connection]
@@ -170,7 +170,7 @@ def _dismiss(connection: socket.socket, reason: bytes) -> None:
 
 
 class _Client:
-    """One connection, its unfinished line, its unsent answers, and when it last did something."""
+    """One connection, its unfinished line, its unsent answers, and the time of its last action."""
 
     def __init__(
         self, connection: socket.socket, answer: Answer, max_line: int, too_long: bytes
@@ -245,12 +245,12 @@ class _Client:
 
 
 class ControlServer(LineServer):
-    """Serves a control socket whenever `serve` is called.
+    """A server for a control socket, which works whenever `serve` is called.
 
     Args:
-        path: path of the socket; a socket left by a killed process is replaced.
-        control: answers the requests.
-        clock: monotonic time in seconds.
+        path: path of the socket. A socket left by a killed process is replaced.
+        control: dispatcher that answers the requests.
+        clock: function that returns monotonic time in seconds.
 
     Raises:
         FileExistsError: another process listens at this path, or the path is a file of another

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _MAX_PATH_BYTES: Final = 107
-"""Longest path for the kernel, without the zero at the end (unix(7), sun_path)."""
+"""Length of the longest path for the kernel, without the zero at the end (unix(7), sun_path)."""
 
 
 def unix_socket() -> socket.socket:
     """Return a new Unix socket.
 
     Raises:
-        OSError: not supported: Python has none on Windows.
+        OSError: Unix sockets are not supported, because Python has none on Windows.
     """
     if sys.platform == "win32":
         raise OSError(errno.EAFNOSUPPORT, "there are no Unix sockets on Windows")
@@ -32,12 +32,12 @@ def unix_socket() -> socket.socket:
 
 
 def listen_at(path: Path) -> socket.socket:
-    """Return a listening socket that only this user may connect to, non-blocking.
+    """Return a non-blocking listening socket to which only this user may connect.
 
     The socket file of a killed process is replaced.
 
     Raises:
-        FileExistsError: a live process listens there, or it is not a socket.
+        FileExistsError: a live process listens at the path, or the path is not a socket.
         BlockingIOError: another program holds a lock on the folder for more than a second.
         OSError: the socket cannot be made.
     """
@@ -61,7 +61,7 @@ _LOCK_AGAIN_S: Final = 0.01
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Serialize processes that start at the same time; each takes milliseconds."""
+    """Serialize processes that start at the same time. Each process takes milliseconds."""
     held = os.open(folder, os.O_RDONLY)
     try:
         if sys.platform != "win32":
@@ -74,7 +74,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 if sys.platform != "win32":
 
     def _lock(held: int, folder: Path) -> None:
-        """Lock a folder; BlockingIOError if another program holds the lock."""
+        """Lock a folder. Raise BlockingIOError if another program holds the lock."""
         import fcntl  # noqa: PLC0415 - not on Windows
 
         for _ in range(_LOCK_TRIES):
@@ -95,10 +95,10 @@ def _check(path: Path) -> None:
 
 
 def _publish(listener: socket.socket, path: Path) -> None:
-    """Listen first, then create the path, so that every client that sees it can connect.
+    """Listen first, then create the path, so that every client that sees the path can connect.
 
-    The socket is renamed, not linked. On the file system of User-Mode Linux a link would be another
-    socket.
+    The socket is renamed, not linked. On the file system of User-Mode Linux, a link would be
+    another socket.
     """
     if len(os.fsencode(path)) > _MAX_PATH_BYTES:
         raise OSError(errno.ENAMETOOLONG, "AF_UNIX path too long", str(path))

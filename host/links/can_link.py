@@ -1,6 +1,6 @@
-"""A CAN link to a real bus, or any other bus of python-can.
+"""A CAN link to a real bus, or to any other bus of python-can.
 
-Conversion between frames and messages of python-can.
+The module also converts between frames and messages of python-can.
 
 >>> to_frame(to_message(CanFrame.parse("00000605#40"))) == CanFrame.parse("00000605#40")
 True
@@ -47,7 +47,7 @@ _NO_MSGPACK: Final = "msgpack not installed"
 
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
-    """Return a message; its timestamp is in seconds, as in python-can."""
+    """Return a message. Its timestamp is in seconds, as in python-can."""
     if isinstance(frame, FdFrame):
         return _fd_message(frame, at_us)
     return can.Message(
@@ -74,7 +74,7 @@ def _fd_message(frame: FdFrame, at_us: int) -> can.Message:
 
 
 def to_frame(message: can.Message) -> CanFrame | None:
-    """Return a frame; None for an error frame and for CAN FD."""
+    """Return a frame, or None for an error frame and for CAN FD."""
     if message.is_error_frame or message.is_fd:
         return None
     remote = message.is_remote_frame
@@ -88,7 +88,7 @@ def to_frame(message: can.Message) -> CanFrame | None:
 
 
 def to_fd_frame(message: can.Message) -> FdFrame | None:
-    """Return a CAN FD frame, not validated; None for any other message.
+    """Return a CAN FD frame, not validated, or None for any other message.
 
     In an ASC log, python-can reads a CAN FD frame without data as a remote frame, but CAN FD has no
     remote frames.
@@ -100,7 +100,7 @@ def to_fd_frame(message: can.Message) -> FdFrame | None:
 
 
 def to_error_frame(message: can.Message) -> ErrorFrame | None:
-    """Return an error frame; None for any other message."""
+    """Return an error frame, or None for any other message."""
     if not message.is_error_frame:
         return None
     data = bytes(message.data)[:8].ljust(8, b"\0")
@@ -108,11 +108,11 @@ def to_error_frame(message: can.Message) -> ErrorFrame | None:
 
 
 _DRIFT: Final = 5_000
-"""Reciprocal of the largest drift between two clocks: 200 ppm."""
+"""Reciprocal of the largest drift between two clocks, which is 200 ppm."""
 
 
 class StampClock:
-    """Computes the arrival of a frame from the time stamp of the driver.
+    """A clock that computes the arrival of a frame from the time stamp of the driver.
 
     The driver's clock starts at an unknown time (1970, or power-on), and it drifts. A frame is read
     after its arrival. Therefore the smallest difference seen between reading time and time stamp is
@@ -136,9 +136,10 @@ class StampClock:
         """Return the arrival time of a frame.
 
         Args:
-            stamp_s: time stamp of the driver, in seconds on its clock; 0 without one.
+            stamp_s: time stamp of the driver, in seconds on the clock of the driver, or 0 without a
+                time stamp.
             polled_us: time of the last poll without a frame.
-            now_us: when the frame was read.
+            now_us: time at which the frame was read.
         """
         stamp_us = round(stamp_s * 1e6)
         if stamp_us <= 0:
@@ -159,19 +160,20 @@ _IPV6_MULTICAST_ALL: Final = 29
 
 _SO_RCVBUFFORCE: Final = 33
 _RECEIVE_BYTES: Final = 4 << 20
-"""Requested size of the kernel's queue: some 10 000 frames; without root it is limited to
-net.core.rmem_max."""
+"""Requested size of the kernel's queue, which is some 10 000 frames. Without root, the size is
+limited to net.core.rmem_max.
+"""
 
 
 def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
-    """Return the next message of a bus; None after the timeout.
+    """Return the next message of a bus, or None after the timeout.
 
     python-can measures a wait by the wall clock. If the wall clock is set back by an hour, the wait
     is an hour longer. This function uses the monotonic clock.
 
     Args:
         recv: method `recv` of the bus. A `recv` that is not python-can's own is called unchanged.
-        timeout_s: how long to wait, in seconds; 0 only polls.
+        timeout_s: longest wait in seconds. 0 only polls.
     """
     # A bus that has a `recv` of its own waits in its own way: leave it.
     if getattr(recv, "__func__", None) is not can.BusABC.recv:
@@ -236,7 +238,7 @@ def _keep_to_group(sock: socket.socket) -> None:
 
 MOST_FAULTS: Final = 100
 FAULTY_S: Final = 1.0
-"""Number of failed reads in a row, and their least duration, after which a bus is given up."""
+"""Number of failed reads in a row, and their minimum duration, after which a bus is given up."""
 
 _TRIES: Final = 16
 """Number of failed reads after which a read returns nothing, so that it does not block."""
@@ -245,32 +247,32 @@ GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
 """Errors of the kernel for an adapter that was unplugged or switched off."""
 
 _SOCKETCAND_BUFFER: Final = "_SocketCanDaemonBus__receive_buffer"
-"""Buffer of python-can's socketcand, which keeps an unreadable frame and those before."""
+"""Buffer of python-can's socketcand, which keeps an unreadable frame and earlier frames."""
 
 _log = log_of(__name__)
 
 
 class BusReceiver:
-    """Reads a bus of python-can, and continues after exceptions of its driver.
+    """A reader of a bus of python-can, which continues after exceptions of its driver.
 
     The driver of a serial adapter raises IndexError for a line with a lost byte, and accepts a line
     with too few data bytes as a frame. Other drivers raise errors of their own. All these faults
     are counted. The 1st, the 10th, the 100th fault and so on are reported.
 
     Args:
-        bus: an open bus without other readers.
-        name: its name for messages.
-        ends: error codes; an OSError or CanError with one of them ends the reading at once.
-        gone: makes the exception that is raised at the end, from a text.
+        bus: open bus without other readers.
+        name: name of the bus for messages.
+        ends: error codes. An OSError or CanError with one of these codes ends the reading at once.
+        gone: function that makes the exception that is raised at the end, from a text.
         raises: errors that are re-raised.
-        read: the function that reads it, by default `recv` of the bus.
+        read: function that reads the bus. By default, it is `recv` of the bus.
 
     Attributes:
         faults: number of failed reads and of truncated frames.
         last: the latest fault, empty after a successful read.
         closed: whether the reader has closed the bus.
-        on_fault: called with each report, which is one line; by default the report is logged as a
-            warning.
+        on_fault: function that is called with each report, which is one line. By default, the
+            report is logged as a warning.
     """
 
     def __init__(  # noqa: PLR0913 - how a bus is read, by keyword
@@ -290,10 +292,10 @@ class BusReceiver:
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
-        """Return the next message; None after the timeout, or if the message cannot be read.
+        """Return the next message, or None after the timeout, or if the message cannot be read.
 
         Args:
-            timeout_s: how long to wait, None without limit.
+            timeout_s: longest wait in seconds, or None without limit.
 
         Raises:
             LinkClosed: the bus is gone, or 100 reads in a row failed over 1 s.
@@ -329,7 +331,7 @@ class BusReceiver:
             raise self._gone(f"{self._name}: {text}") from error
 
     def _fail(self, error: Exception) -> None:
-        """Count a failed read; stop reading after too many."""
+        """Count a failed read. Stop reading after too many failed reads."""
         if isinstance(error, self._raises):
             raise error
         now_s = time.monotonic()
@@ -380,13 +382,13 @@ def reason_of(error: Exception) -> str:
 
 
 def error_code(error: Exception) -> int | None:
-    """Return the errno of a CanError or an OSError, None if it has none."""
+    """Return the errno of a CanError or an OSError, or None if it has none."""
     code = getattr(error, "error_code", None) or getattr(error, "errno", None)
     return code if isinstance(code, int) else None
 
 
 def close_bus(bus: can.BusABC) -> None:
-    """Close a bus; log exceptions of the driver if it is gone."""
+    """Close a bus. Log exceptions of the driver if the bus is gone."""
     try:
         bus.shutdown()
     except Exception as error:  # drivers raise what they like
@@ -395,7 +397,7 @@ def close_bus(bus: can.BusABC) -> None:
 
 _SEND_TIMEOUT_US: Final = 1_000_000
 _AGAIN_S: Final = 0.001
-"""Retry period for a full queue; the queue of SocketCAN has ten places."""
+"""Retry period for a full queue. The queue of SocketCAN has ten places."""
 _PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
@@ -405,15 +407,16 @@ class CanLink:
     Received CAN FD frames are ignored, and error frames except for the error state.
 
     Args:
-        bus: an open bus without other readers.
-        name: its name for messages.
+        bus: open bus without other readers.
+        name: name of the bus for messages.
         drops: whether to drop a frame without waiting if the bus does not accept it.
 
     Attributes:
-        lost: frames that the bus did not accept.
-        reads: reads the bus, and counts the frames that its driver could not read.
-        on_error_frame: called with each error frame of the driver.
-        on_error_state: called with the error state of the controller, if the driver reports it.
+        lost: number of frames that the bus did not accept.
+        reads: reader of the bus, which also counts the frames that its driver could not read.
+        on_error_frame: function that is called with each error frame of the driver, or None.
+        on_error_state: function that is called with the error state of the controller, if the
+            driver reports it, or None.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
@@ -435,7 +438,7 @@ class CanLink:
             bit_rate: bits per second, if the interface sets it.
 
         Returns:
-            A link that owns the bus; close it.
+            A link that owns the bus. Close the link after use.
 
         Raises:
             LinkClosed: the bus cannot be opened.
@@ -448,14 +451,14 @@ class CanLink:
 
     @property
     def now_us(self) -> int:
-        """The machine's monotonic clock."""
+        """Time of the machine's monotonic clock."""
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: Frames, /) -> None:
         """Send frames.
 
         Args:
-            traffic: the frames, in order.
+            traffic: frames in the order of sending.
 
         Raises:
             LinkClosed: the bus is gone, or accepted no frame for 1 s.
@@ -466,7 +469,7 @@ class CanLink:
                 time.sleep(_AGAIN_S)
 
     def _sent(self, frame: CanFrame, deadline_us: int) -> bool:
-        """Send a frame; return False if the queue of the driver is full."""
+        """Send a frame. Return False if the queue of the driver is full."""
         try:
             self._bus.send(to_message(frame), 0 if self._drops else _SEND_TIMEOUT_US / 1e6)
         except Exception as error:  # drivers raise what they like
@@ -482,7 +485,7 @@ class CanLink:
         """Wait for a first frame, then return all received frames.
 
         Args:
-            timeout_us: how long to wait; 0 only polls.
+            timeout_us: longest wait. 0 only polls.
 
         Returns:
             The frames, empty after the timeout.
@@ -496,7 +499,7 @@ class CanLink:
         """Wait for a first frame, then return all received frames with their times.
 
         Args:
-            timeout_us: how long to wait; 0 only polls.
+            timeout_us: longest wait. 0 only polls.
 
         Returns:
             A time, and the frames that had arrived by then, each with its own time.
@@ -545,7 +548,7 @@ def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
 def _is_full(error: Exception) -> bool:
     """Return whether earlier frames are still unsent.
 
-    Possible reasons: no other node is on the bus, the cable is unplugged, or the controller is
+    Possible reasons are: no other node is on the bus, the cable is unplugged, or the controller is
     bus-off.
     """
     if isinstance(error, can.CanOperationError):
@@ -559,7 +562,7 @@ def _has_no_room(error: Exception) -> bool:
 
 
 def _error_state(message: can.Message) -> ErrorState | None:
-    """Return the error state in an error frame of SocketCAN, None if it has none."""
+    """Return the error state in an error frame of SocketCAN, or None if it has none."""
     # Bits 0 to 8: the classes of linux/can/error.h that were there from the beginning.
     error = ErrorClass(message.arbitration_id & 0x1FF)
     if ErrorClass.BUS_OFF in error:

@@ -1,4 +1,4 @@
-"""Echoes of sent frames, and their separation from frames of others."""
+"""Echoes of sent frames, and their separation from frames of other nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ECHO_US: Final = 1_000_000
 
 
 class EchoFilter:
-    """Separates the echo of sent frames from frames of others.
+    """A filter that separates the echo of sent frames from frames of other nodes.
 
     If an equal frame of another node arrives before the echo, that frame counts as the echo. The
     echo then counts as the frame of the other node.
@@ -40,7 +40,7 @@ class EchoFilter:
                 self.take(frame)
 
     def take(self, frame: CanFrame) -> bool:
-        """Return whether a frame is an expected echo, and remove it from the expected ones."""
+        """Return whether a frame is an expected echo. An echo is then no longer expected."""
         if frame not in self._awaited:
             return False
         times = self._awaited[frame]
@@ -54,7 +54,7 @@ class EchoFreeLink:
     """A `StampedLink` on the udp_multicast bus of python-can, which receives its own frames.
 
     Args:
-        link: the link with the echo.
+        link: link with the echo.
     """
 
     def __init__(self, link: StampedLink) -> None:
@@ -62,23 +62,23 @@ class EchoFreeLink:
 
     @property
     def now_us(self) -> int:
-        """The clock of the link."""
+        """Time on the clock of the link."""
         return self._link.now_us
 
     def send(self, traffic: Frames, /) -> None:
-        """Send, and expect the echo."""
+        """Send frames, and expect their echo."""
         self._echo.sent(self.now_us, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Return frames of others.
+        """Return frames of other nodes.
 
         If only echoes arrive, return no frames, possibly before the timeout.
         """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Return a time, and the frames of others up to it."""
+        """Return a time, and the frames of other nodes up to this time."""
         now_us, received = self._link.receive_stamped(timeout_us)
         self._echo.expire(now_us)
         return now_us, tuple(

@@ -13,13 +13,16 @@ EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
 ABS_Y: Final = 0x01
 ABS_RX: Final = 0x03
-"""Codes of the kernel's input-event-codes: left stick sideways, forward; right stick sideways."""
+"""Codes of the kernel's input-event-codes.
+
+The axes are: left stick sideways, left stick forward, right stick sideways.
+"""
 
 _Range = tuple[int, int]
 
 
 class StickPosition(NamedTuple):
-    """Deflection of the sticks, each -1..1: forward, to the left, turning to the left."""
+    """Deflection of the sticks, each in -1..1: forward, to the left, turning to the left."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -52,14 +55,14 @@ class Axes:
     def hand(self) -> StickPosition:
         """Return the deflection.
 
-        The left stick gives driving forward and turning; the right stick gives driving sideways.
+        The left stick gives driving forward and turning. The right stick gives driving sideways.
         """
         across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
         return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
 
 
 class EvdevPad:
-    """Reads a pad such as `/dev/input/event5`.
+    """A reader of a pad such as `/dev/input/event5`.
 
     Raises:
         LinkClosed: evdev is not installed, or the pad cannot be opened.

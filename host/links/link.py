@@ -50,11 +50,11 @@ class DeviceRefused(Exception):  # noqa: N818 - what the device did
     """The device answered with a refusal.
 
     Args:
-        message: the text for people.
-        code: the reason given by the device.
+        message: text of the refusal for the user.
+        code: reason code given by the device.
 
     Attributes:
-        code: the reason given by the device, in its own notation.
+        code: reason code given by the device, in the notation of the device.
     """
 
     def __init__(self, message: str, code: str) -> None:
@@ -71,7 +71,7 @@ class Link(Protocol[W]):
     """The wire of a proxy, with its clock.
 
     A proxy reads the time from its link, never from the clock of the machine. On a rig in virtual
-    time the same proxy waits a minute of virtual time within a millisecond.
+    time, the same proxy waits a minute of virtual time within a millisecond.
     """
 
     @property
@@ -95,18 +95,18 @@ class Link(Protocol[W]):
         ...
 
     def close(self) -> None:
-        """Close the line; closing it again has no effect."""
+        """Close the line. Closing it again has no effect."""
 
 
 StampedFrames = tuple[tuple[int, CanFrame], ...]
-"""Frames, each with its end on the bus, on the clock of its link."""
+"""Frames, each with the time of its end on the bus, on the clock of its link."""
 
 
 class StampedLink(Link[Frames], Protocol):
     """A link to a CAN bus with time stamps, which separate late reading from silence of the bus."""
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all frames received by then.
+        """Wait for a first frame. Return a time, and all frames received by then.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -148,7 +148,7 @@ class ReopeningLink(Generic[W]):
     line, for example after the cable is plugged in again or the emulator is restarted.
 
     Args:
-        open_link: opens the line; called at once.
+        open_link: function that opens the line. It is called at once.
 
     Raises:
         LinkClosed: the line cannot be opened.
@@ -166,7 +166,7 @@ class ReopeningLink(Generic[W]):
     def send(self, traffic: W, /) -> None:
         """Send traffic, on a new link if the line was lost.
 
-        Raises LinkClosed if the new link cannot be opened.
+        The method raises LinkClosed if the new link cannot be opened.
         """
         # Only sending opens again: a reader in a loop would try as often as it looks.
         if self._gone and not self._closed:
@@ -178,7 +178,10 @@ class ReopeningLink(Generic[W]):
             raise
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return received traffic, empty after `timeout_us`; LinkClosed if the line is lost."""
+        """Return received traffic, empty after `timeout_us`.
+
+        Raise LinkClosed if the line is lost.
+        """
         try:
             return self._link.receive(timeout_us)
         except LinkClosed:

@@ -24,7 +24,7 @@ from types import SimpleNamespace
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 SELECTABLE: Final = 1_024
-"""FD_SETSIZE: `select` supports only descriptors below it."""
+"""FD_SETSIZE, above which `select` does not support descriptors."""
 
 _SPARE: Final = 8
 """Spare descriptors, because a port opens several."""
@@ -33,7 +33,7 @@ _FOREIGN: Final = (
     *("serial.serialposix", "serial.urlhandler.protocol_socket"),
     *("can.interfaces.socketcan.socketcan", "can.interfaces.udp_multicast.bus"),
 )
-"""Foreign modules that wait with `select`."""
+"""Modules of other packages that wait with `select`."""
 
 
 class _HasDescriptor(Protocol):
@@ -54,12 +54,12 @@ def ready(
     """Wait until descriptors can be read or written.
 
     Args:
-        readers: descriptors, or objects with one.
-        writers: descriptors, or objects with one.
-        wait_s: longest wait in s; None without limit.
+        readers: descriptors, or objects with a descriptor.
+        writers: descriptors, or objects with a descriptor.
+        wait_s: longest wait in s, or None without limit.
 
     Returns:
-        The descriptors that can be read, and the descriptors that can be written; both lists
+        The descriptors that can be read, and the descriptors that can be written. Both lists
         include broken descriptors.
 
     Raises:
@@ -78,7 +78,7 @@ if sys.platform != "win32":
     def _polled(
         readers: Sequence[_Read], writers: Sequence[_Written], wait_s: float | None
     ) -> tuple[list[_Read], list[_Written]]:
-        """Do the same with `poll`, which counts in whole milliseconds."""
+        """Wait with `poll`, which counts in whole milliseconds."""
         wanted: dict[int, int] = {}
         for sources, event in ((readers, select.POLLIN), (writers, select.POLLOUT)):
             for source in sources:
@@ -157,7 +157,7 @@ class WaitingQueue(Generic[_T]):
         """Return the first item.
 
         Args:
-            wait_s: longest wait; None without limit.
+            wait_s: longest wait, or None without limit.
 
         Raises:
             Empty: nothing arrived in time.

@@ -23,13 +23,13 @@ class RecordingLink(Generic[W]):
 
     Each line is written at once, so that no line is lost if the process is killed. If writing
     fails, the recording ends with one warning, and the link continues. Two threads may use the link
-    at the same time, one of them to send.
+    at the same time, if only one of them sends.
 
     Args:
-        link: the link, of bytes or frames.
-        path: the file; an existing one is replaced.
-        name: name of the device in the trace; for frames, the name of the bus.
-        type: device type, such as `rrc`; empty if unknown.
+        link: link to record, of bytes or frames.
+        path: path of the file. An existing file is replaced.
+        name: name of the device in the trace, or for frames the name of the bus.
+        type: device type such as `rrc`, empty if unknown.
 
     Raises:
         OSError: the file cannot be opened.
@@ -68,7 +68,7 @@ class RecordingLink(Generic[W]):
             traffic: bytes or frames.
 
         Raises:
-            LinkClosed: the line is gone; unsent data are not recorded.
+            LinkClosed: the line is gone. Unsent data are not recorded.
         """
         at_us = self._link.now_us
         self._link.send(traffic)
@@ -78,7 +78,7 @@ class RecordingLink(Generic[W]):
         """Receive and record traffic.
 
         Args:
-            timeout_us: how long to wait; 0 only polls.
+            timeout_us: longest wait. 0 only polls.
 
         Returns:
             The received traffic, empty after the timeout.
@@ -95,14 +95,14 @@ class RecordingLink(Generic[W]):
         """Receive frames with their times, and record them.
 
         Args:
-            timeout_us: how long to wait; 0 only polls.
+            timeout_us: longest wait. 0 only polls.
 
         Returns:
             A time, and the frames received by then, each with its own time.
 
         Raises:
             LinkClosed: the bus is gone.
-            TypeError: it is not a link to a bus.
+            TypeError: the link is not a link to a bus.
         """
         link: Any = self._link
         if not hasattr(link, "receive_stamped"):
@@ -117,7 +117,7 @@ class RecordingLink(Generic[W]):
 
         Args:
             name: name of the physical input, such as `power_button`.
-            value: its new value.
+            value: new value of the input.
         """
         self._write(self._link.now_us, Mark.PHYSICAL, text=change_text(name, value))
 
@@ -126,7 +126,7 @@ class RecordingLink(Generic[W]):
         self._write(self._link.now_us, Mark.PHYSICAL, text=RESET)
 
     def close(self) -> None:
-        """Write the duration of the recording, and close the link; may be called again."""
+        """Write the duration of the recording, and close the link. You may call this again."""
         with self._lock:
             end_us = max(self._link.now_us - self._start_us, self._latest_us)
             self._file.close(BenchRecord(end_us, "", Mark.END).encode())
@@ -141,7 +141,7 @@ class RecordingLink(Generic[W]):
     def _write(
         self, at_us: int, mark: Mark, traffic: bytes | CanFrame = b"", text: str = ""
     ) -> None:
-        """Write a line; its time is never before that of the previous line."""
+        """Write a line. Its time is never before the time of the previous line."""
         with self._lock:
             self._latest_us = max(self._latest_us, at_us - self._start_us)
             record = BenchRecord(self._latest_us, self._name, mark, traffic, text)
@@ -149,7 +149,7 @@ class RecordingLink(Generic[W]):
 
 
 def _items(traffic: object) -> list[bytes | CanFrame]:
-    """Return traffic split into lines of a trace: all bytes, or one frame each."""
+    """Return traffic split into lines of a trace, which are all bytes, or one frame each."""
     if isinstance(traffic, bytes):
         return [traffic] if traffic else []
     assert isinstance(traffic, tuple)

@@ -1,4 +1,4 @@
-"""A byte link to a serial port, real, pseudo or remote, by any pyserial URL."""
+"""A byte link to a serial port, which is real, pseudo or remote, by any pyserial URL."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def tune(connection: socket.socket) -> None:
     """Send each write at once, and detect a vanished machine after 25 s.
 
     Args:
-        connection: a TCP connection.
+        connection: TCP connection to tune.
 
     Raises:
         OSError: the connection is closed, or is not a TCP connection.
@@ -46,7 +46,7 @@ def _give_up_unanswered(connection: socket.socket) -> None:
     """End a connection if the other machine has not acknowledged sent data for 25 s.
 
     Args:
-        connection: a TCP connection.
+        connection: TCP connection to check.
 
     Raises:
         OSError: the connection is closed, or is not a TCP connection.
@@ -60,7 +60,7 @@ def _give_up_unanswered(connection: socket.socket) -> None:
 _SAID_SHOWN: Final = 200
 
 _WRITE_S: Final = 1.0
-"""How long a write waits for room (5 s in pyserial)."""
+"""Longest time that a write waits for room (5 s in pyserial)."""
 
 
 class _Rfc2217Serial(rfc2217.Serial):
@@ -74,7 +74,7 @@ class _Rfc2217Serial(rfc2217.Serial):
       line.
     - When a connection ends, pyserial discards data received before.
 
-    Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
+    Args and attributes are those of `serial.Serial`, except that `write_timeout` cannot be set.
     """
 
     _agreed: object = None
@@ -106,7 +106,7 @@ class _Rfc2217Serial(rfc2217.Serial):
             connection.close()
 
     def read(self, size: int = 1) -> bytes:
-        """Return up to `size` bytes; fewer after the time-out, or if the connection has ended.
+        """Return up to `size` bytes, or fewer after the time-out, or if the connection has ended.
 
         Raises:
             SerialException: the connection has ended, and all received data were read.
@@ -126,7 +126,7 @@ class _Rfc2217Serial(rfc2217.Serial):
         return bytes(received)
 
     def _telnet_read_loop(self) -> None:
-        """Receive data in a thread; end at invalid telnet data as at a closed connection."""
+        """Receive data in a thread. End at invalid telnet data as at a closed connection."""
         try:
             with suppress(TypeError, OSError):
                 super()._telnet_read_loop()  # type: ignore[misc] # not in typeshed
@@ -136,7 +136,7 @@ class _Rfc2217Serial(rfc2217.Serial):
 
     @property
     def _queue(self) -> Queue[bytes | None] | None:
-        """Queue of the reading thread, None if there was no connection yet."""
+        """Queue of the reading thread, or None if there was no connection yet."""
         queue: Queue[bytes | None] | None = self._read_buffer  # type: ignore[attr-defined]
         return queue
 
@@ -158,9 +158,9 @@ class SerialLink:
     """A `Link[bytes]` over pyserial.
 
     Args:
-        url: a device path or pyserial URL: `/dev/ttyACM0`, `COM3`,
-            `socket://host:port`, `rfc2217://host:port`, `loop://`.
-        baud: bit rate in bit/s, 8N1.
+        url: device path or pyserial URL, such as `/dev/ttyACM0`, `COM3`, `socket://host:port`,
+            `rfc2217://host:port` or `loop://`.
+        baud: bit rate in bit/s, with 8N1.
         exclusive: whether to lock the port by flock, as pyserial's own tools do. Without the lock,
             two readers would each get a part of the data.
 
@@ -184,14 +184,14 @@ class SerialLink:
 
     @property
     def now_us(self) -> int:
-        """The machine's monotonic clock."""
+        """Time of the machine's monotonic clock."""
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: bytes, /) -> None:
         """Write bytes.
 
         Args:
-            traffic: the bytes.
+            traffic: bytes to send.
 
         Raises:
             LinkClosed: the port is gone, or accepts no data for 1 s.
@@ -205,7 +205,7 @@ class SerialLink:
         """Wait for a first byte, then return all received bytes.
 
         Args:
-            timeout_us: how long to wait; 0 only polls.
+            timeout_us: longest wait. 0 only polls.
 
         Returns:
             The bytes, empty after the timeout.
@@ -236,7 +236,7 @@ class SerialLink:
 
 
 def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | _Rfc2217Serial:
-    """Open a pyserial URL; use `_Rfc2217Serial` for RFC 2217."""
+    """Open a pyserial URL. Use `_Rfc2217Serial` for RFC 2217."""
     if not url.startswith("rfc2217:"):
         return serial.serial_for_url(
             url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
@@ -253,8 +253,8 @@ def explain_open_error(url: str, error: Exception) -> str:
     """Return the reason why a port cannot be opened.
 
     Args:
-        url: the requested port.
-        error: the exception on opening.
+        url: requested port.
+        error: exception on opening.
     """
     around = error.__context__ if error.__cause__ is None else None
     if isinstance(around, OSError) and around.strerror:

@@ -1,4 +1,4 @@
-"""A terminal: single keys, and output without blocking."""
+"""A terminal with single keys, and output without blocking."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _CONTROL_CHARACTERS: Final = 6
 
 
 def take_keys(descriptor: int) -> Callable[[], None]:
-    """Make a terminal return each key at once without echo; reading never blocks.
+    """Make a terminal return each key at once without echo. Reading never blocks.
 
     Ctrl-Z is disabled, because a program stopped by it would leave the terminal in this mode.
 
     Args:
-        descriptor: of the terminal.
+        descriptor: descriptor of the terminal.
 
     Returns:
-        A function that restores the terminal; it does nothing if the terminal is gone.
+        A function that restores the terminal. It does nothing if the terminal is gone.
 
     Raises:
         OSError: the descriptor is not a terminal, or the system has no POSIX terminals (Windows).
@@ -53,23 +53,24 @@ def take_keys(descriptor: int) -> Callable[[], None]:
 
 
 MOST_WAITING: Final = 131_072
-"""bytes"""
+"""Maximum number of bytes that wait for a terminal."""
 
 _CLOSING_S: Final = 0.5
 _LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
-    """Writes to a terminal in its own thread, so that a stuck terminal does not block the program.
+    """A writer to a terminal in its own thread. A stuck terminal does not block the program.
 
     A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
     fit into the queue is dropped.
 
     Args:
-        descriptor: descriptor of the terminal; the text is written to a duplicate of it.
-        caught_up: called from that thread when all text is written and some text was dropped
-            before.
-        lost: called from that thread when the terminal is gone.
+        descriptor: descriptor of the terminal. The text is written to a duplicate of the
+            descriptor.
+        caught_up: function that is called from that thread when all text is written and some text
+            was dropped before.
+        lost: function that is called from that thread when the terminal is gone.
 
     Attributes:
         gone: whether the terminal is gone.
@@ -96,12 +97,12 @@ class TerminalOutput:
         return bool(self._waiting) or self._writing
 
     def catches_up(self, within_s: float) -> bool:
-        """Wait until the terminal has accepted all text; return False after the time-out."""
+        """Wait until the terminal has accepted all text. Return False after the time-out."""
         with self._changed:
             return self._changed.wait_for(lambda: not self.is_behind, within_s)
 
     def write(self, text: str, *, last: bool = False) -> None:
-        """Queue a text; the last texts are never dropped."""
+        """Queue a text. The last texts are never dropped."""
         data = text.encode("utf-8", "replace")
         with self._changed:
             if self.gone:
@@ -113,7 +114,7 @@ class TerminalOutput:
             self._changed.notify_all()
 
     def close(self) -> bool:
-        """End the thread; return False if the terminal does not accept the remaining text."""
+        """End the thread. Return False if the terminal does not accept the remaining text."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -138,7 +139,7 @@ class TerminalOutput:
         os.close(self._descriptor)
 
     def _ends(self) -> bool:
-        """Wait for text; return True at the end, and raise OSError if the terminal is gone."""
+        """Wait for text. Return True at the end, and raise OSError if the terminal is gone."""
         with self._changed:
             while not self._waiting and not self._closing:
                 if not self._changed.wait(_LOOK_S) and _is_hung_up(self._descriptor):

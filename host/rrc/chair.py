@@ -1,4 +1,4 @@
-"""A chair with an RRC: protected, driven while a dead-man key is held, stopped at the end."""
+"""A chair with an RRC, which is protected, driven by a dead-man key, and stopped at the end."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ from tickrig.wire.rrc.replies import Event, Ok, RrcEvent, StatusA
 # loops look at it.
 
 DEAD_MAN_US: Final = 1_000_000
-"""How long a press of the dead-man key is valid."""
+"""Time for which a press of the dead-man key is valid."""
 
 STEP_US: Final = 20_000
 _RESEND_US: Final = 100_000
 _SILENT_US: Final = 300_000
-"""Time without a status line after which the RRC counts as silent; status lines come each 10 ms."""
+"""Time without a status line after which the RRC counts as silent. Status lines come each 10 ms."""
 
 _ASK_US: Final = 1_000_000
-"""Time without a status line after which the RRC is queried: it sends none while VR2 is off."""
+"""Time without a status line after which the RRC is queried. It sends none while VR2 is off."""
 
 _TAKEN_US: Final = 200_000
-"""Time after which a status line shows a command."""
+"""Time after which a status line shows the effect of a command."""
 
 _STOP_TRIES: Final = 3
 _MEET_TRIES: Final = 3
-"""How often to query an RRC that has answered once: a busy machine delivers answers late."""
+"""Number of queries to an RRC that has answered once, because a busy machine delivers late."""
 
 _KEPT_BYTES: Final = 4_096
 _SHOWN_BYTES: Final = 40
@@ -71,10 +71,10 @@ _STOPS: Final = frozenset(
 
 
 class ChairStopped(Exception):  # noqa: N818 - what happened
-    """VR2 is off, or was stopped.
+    """VR2 is off or was stopped.
 
     Attributes:
-        kind: the event that reported this, None if there was no event.
+        kind: event that reported the stop, or None if there was no event.
     """
 
     def __init__(self, message: str, kind: RrcEvent | None = None) -> None:
@@ -83,7 +83,7 @@ class ChairStopped(Exception):  # noqa: N818 - what happened
 
 
 class NotAnRrc(LinkError):  # noqa: N818 - what is there
-    """Another device than an RRC answers."""
+    """A device that is not an RRC answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class Guard:
     """Protection of the chair while a program controls it.
 
     Attributes:
-        watchdog_us: time without a command after which VR2 stops; 0 is off.
+        watchdog_us: time without a command after which VR2 stops. 0 switches the watchdog off.
         stable: whether stablemode is switched on.
     """
 
@@ -106,7 +106,7 @@ class DeadMan:
         self._until_us: int | None = None
 
     def press(self, now_us: int) -> None:
-        """Register a press."""
+        """Record a press."""
         self._until_us = now_us + DEAD_MAN_US
 
     def release(self) -> None:
@@ -123,7 +123,7 @@ class _OpeningLink:
     """A `Link[bytes]` that stores the first received bytes.
 
     Attributes:
-        received: these bytes.
+        received: bytes that were received first.
     """
 
     def __init__(self, link: Link[bytes]) -> None:
@@ -151,20 +151,20 @@ class _OpeningLink:
 
 
 class Chair(Closing):
-    """An RRC protected by a guard; the end of a `with` block stops the motors.
+    """An RRC protected by a guard. The end of a `with` block stops the motors.
 
     Args:
-        link: the open line; the chair closes it at the end.
-        guard: what protects the chair.
+        link: open line, which the chair closes at the end.
+        guard: protection of the chair.
 
     Attributes:
-        client: talks to the RRC.
-        guard: what protects the chair.
+        client: client that communicates with the RRC.
+        guard: protection of the chair.
         moved: whether the motors may run because of this program.
 
     Raises:
         NotAnRrc: another device answers.
-        LinkTimeout: no answer.
+        LinkTimeout: no device answers.
         LinkClosed: the line is gone.
     """
 
@@ -195,7 +195,7 @@ class Chair(Closing):
             self.client.status()
 
     def _meet(self, opening: _OpeningLink) -> None:
-        """Contact the RRC and check its answer; a line with an echo does not answer OK:device."""
+        """Contact the RRC and check its answer. A line with an echo does not answer OK:device."""
         failure: Exception | None = None
         for _ in range(_MEET_TRIES):
             try:
@@ -220,7 +220,7 @@ class Chair(Closing):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop the motors, restore the initial settings of the RRC, close the line."""
+        """Stop the motors, restore the initial settings of the RRC, and close the line."""
         try:
             if not isinstance(error, LinkClosed):
                 self._leave()
@@ -231,7 +231,7 @@ class Chair(Closing):
             self.client.close()
 
     def close(self) -> None:
-        """Close the line; the watchdog stops VR2."""
+        """Close the line. The watchdog stops VR2."""
         self.client.close()
 
     def leave_driving(self) -> None:
@@ -249,7 +249,7 @@ class Chair(Closing):
             client.watchdog(0)
 
     def status(self) -> StatusA | None:
-        """Switch status lines on and return the next status line; None if VR2 is off."""
+        """Switch status lines on and return the next status line, or None if VR2 is off."""
         if self._status_since_us is None:
             self._status_since_us = self.client.now_us
             self.client.status()
@@ -259,7 +259,7 @@ class Chair(Closing):
         return None if latest is None else latest.value
 
     def require_on(self) -> StatusA:
-        """Return a status line; ChairStopped if VR2 is off."""
+        """Return a status line. Raise ChairStopped if VR2 is off."""
         status = self.status()
         if status is None:
             raise ChairStopped(_OFF)
@@ -276,7 +276,7 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def drive(self, v_pct: int, w_pct: int) -> None:
-        """Drive for 20 ms: forward and to the right, -100..100 %.
+        """Drive for 20 ms, forward and to the right, each in -100..100 %.
 
         Raises:
             ChairStopped: VR2 was stopped, or deviates from the command.
@@ -302,7 +302,7 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def watch(self) -> list[Arrival[Event]]:
-        """Check lines received since the last call; return the events that do not end the drive.
+        """Check lines received since the last call. Return the events that do not end the drive.
 
         Raises:
             ChairStopped: VR2 was stopped, or deviates from the command.
@@ -331,10 +331,10 @@ class Chair(Closing):
         return events
 
     def ask_if_silent(self) -> None:
-        """Ask the RRC for its name if no status line has come for a second: VR2 may be off.
+        """Query the name of the RRC if no status line has come for a second, as VR2 may be off.
 
         Raises:
-            LinkTimeout: it does not answer.
+            LinkTimeout: the RRC does not answer.
         """
         latest, now_us = self.latest_status, self.client.now_us
         heard_us = 0 if latest is None else latest.at_us
@@ -350,14 +350,14 @@ class Chair(Closing):
         self._asked_us = self.client.now_us
 
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
-        """Stop sending until an event arrives, like a program that hangs; then resume sending.
+        """Stop sending until an event arrives, like a program that hangs. Then resume sending.
 
         Args:
-            kind: the event.
+            kind: kind of the event.
             most_us: longest wait.
 
         Returns:
-            How long the event took; None after the time-out.
+            The time until the event, or None after the time-out.
         """
         lines, began_us = LineSplitter(), self.client.now_us
         wanted = Event(kind).encode().removesuffix(b"\n")
@@ -373,7 +373,7 @@ class Chair(Closing):
     def stop(self) -> None:
         """Stop the motors, and wait for a status line that confirms it.
 
-        Without this confirmation, switch VR2 off.
+        Without this confirmation, VR2 is switched off.
         """
         if not self.moved:
             return
@@ -399,7 +399,7 @@ class Chair(Closing):
     def _stands(self) -> bool:
         """Wait for a status line whose output is 0.
 
-        With stablemode the RRC does not reply to a lost line, so only a status line confirms the
+        With stablemode, the RRC does not reply to a lost line, so only a status line confirms the
         stop.
         """
         since_us = self.client.now_us
@@ -425,6 +425,6 @@ class Chair(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line; None if VR2 has been off since."""
+        """The newest status line, or None if VR2 has been off since."""
         latest, since_us = self.client.latest_status, self._status_since_us
         return latest if latest and since_us is not None and latest.at_us >= since_us else None

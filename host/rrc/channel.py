@@ -1,4 +1,4 @@
-"""The line to one RRC: pace of sending, renewal of the watchdog, stop after refusals.
+"""The line to one RRC, with pace of sending, renewal of the watchdog, and stop after refusals.
 
 Errors besides LinkTimeout and LinkClosed:
 
@@ -95,8 +95,8 @@ class RrcRefused(DeviceRefused):
     """The RRC answered a command with ER.
 
     Attributes:
-        code: the reason given by the RRC: a command's name, or `CommandChecksum`, ...
-        sent: the line that was refused, without LF.
+        code: reason given by the RRC, which is a command's name, or `CommandChecksum` and others.
+        sent: line that was refused, without LF.
     """
 
     def __init__(self, sent: str, code: str) -> None:
@@ -106,12 +106,12 @@ class RrcRefused(DeviceRefused):
 
 
 class RrcStopped(DeviceRefused):
-    """The RRC refused too many times in a row, and the client has stopped sending.
+    """The RRC refused too many times in a row. The client has stopped sending.
 
     The client sends again after EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
 
     Attributes:
-        code: the last reason.
+        code: reason of the last refusal.
     """
 
     def __init__(self, what: str, code: str) -> None:
@@ -123,7 +123,7 @@ _PCT_US: Final = message.PERIOD_US // (message.SAFE_PCT - message.BASE_PCT - mes
 
 _LINE_US: Final = message.LINE_FEED_PCT * _PCT_US
 _REPLY_US: Final = message.REPLY_PCT * _PCT_US
-"""Cost of a line to the RRC, 6.25 ms, and of its answer, 3.75 ms."""
+"""Cost of a line to the RRC, which is 6.25 ms, and of its answer, which is 3.75 ms."""
 
 _SECOND_US: Final = 1_000_000
 
@@ -143,9 +143,9 @@ class RrcLoad:
     Lines that other programs send to the same RRC are not included.
 
     Attributes:
-        load_pct: its load in per cent: 30 for its own work, plus the cost of the lines.
-        margin_pct: the remainder to 100; the client leaves 10 or more.
-        pace_lines_s: largest number of lines per second without waiting for answers.
+        load_pct: load in per cent, which is 30 for the RRC's own work, plus the cost of the lines.
+        margin_pct: remainder of the load to 100. The client leaves 10 or more.
+        pace_lines_s: maximum number of lines per second without waiting for answers.
     """
 
     load_pct: int
@@ -154,7 +154,7 @@ class RrcLoad:
 
 
 class Channel:
-    """Sends commands at the RRC's pace and assigns every received line to its owner.
+    """A channel that sends commands at the RRC's pace and assigns received lines to their owners.
 
     To renew the watchdog, the channel sends `watchdog` again with the same value. This is the only
     command that changes no setting. With stablemode the RRC does not answer it. The channel renews
@@ -165,10 +165,10 @@ class Channel:
     `watchdog` only if no other command was sent for a third of the time.
 
     Args:
-        link: the line.
-        inbox: keeps the lines that no request waits for.
+        link: line to the RRC.
+        inbox: inbox for the lines that no request waits for.
         max_refusals: number of refusals in a row after which the channel stops, 1 or more.
-        on_refusals: the reaction to too many refusals.
+        on_refusals: reaction to too many refusals.
 
     Attributes:
         matcher: state of the RRC and of the commands sent to it.
@@ -186,7 +186,7 @@ class Channel:
 
     @property
     def load(self) -> RrcLoad:
-        """The load of the RRC by this channel."""
+        """The load of the RRC that this channel causes."""
         self._forget_costs()
         load_pct = message.BASE_PCT + sum(pct for _, pct in self._costs) // message.PERIODS_A_SECOND
         line_us = _LINE_US + _REPLY_US * (not self.matcher.settings.stable)
@@ -198,7 +198,7 @@ class Channel:
         self._put_unawaited(command)
 
     def request(self, command: Command, timeout_us: int) -> str:
-        """Send a command, wait until the RRC has processed it, return the text of the answer."""
+        """Send a command and wait until the RRC has processed it. Return the text of the answer."""
         self._wait_turn(command)
         exchange = Exchange(command, stable=self.matcher.settings.stable)
         for line in exchange.lines:
@@ -220,7 +220,7 @@ class Channel:
         return exchange.text
 
     def step(self, until_us: int) -> None:
-        """Listen once; RrcStopped after one refusal too many."""
+        """Listen once. Raise RrcStopped after one refusal too many."""
         self._listen(until_us)
         self._raise_alarm()
 
@@ -255,7 +255,7 @@ class Channel:
 
     @property
     def _renewal_us(self) -> int:
-        """When to renew the watchdog; `NEVER` if it is off."""
+        """Time of the next renewal of the watchdog, or `NEVER` if the watchdog is off."""
         watchdog_10ms = self.matcher.settings.watchdog_10ms
         if not watchdog_10ms or self.matcher.refusals.stopped is not None:
             return NEVER

@@ -28,13 +28,13 @@ _ANGLE: Final = click.IntRange(0, 90)
 
 @dataclass(frozen=True, slots=True)
 class RrcCall:
-    """Options before the verb.
+    """The options before the verb.
 
     Attributes:
-        url: URL of the port; empty if none was given.
-        watchdog_us: time of the watchdog of the RRC; 0 is off.
+        url: URL of the port, empty if none was given.
+        watchdog_us: time of the watchdog of the RRC. 0 switches it off.
         stable: whether stablemode is switched on.
-        pad: path of a game pad, None without one.
+        pad: path of a game pad, or None without a pad.
     """
 
     url: str
@@ -44,14 +44,14 @@ class RrcCall:
 
 
 class _Url(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
-    """A port, which the shell completes as a file."""
+    """A port that the shell completes as a file."""
 
     name = "url"
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Let the shell offer its files."""
+        """Let the shell offer file names."""
         return [CompletionItem(incomplete, type="file")]
 
 
@@ -71,7 +71,10 @@ class _RrcGroup(HarmlessCommand, click.Group):
     command_class = _Verb
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Accept options after URL too, and no URL if a verb comes first, for its help."""
+        """Accept options after URL too.
+
+        Accept no URL if a verb comes first, for the help of the verb.
+        """
         options, url, rest = self._split(ctx, args)
         if url in self.commands:
             return super().parse_args(ctx, [*options, "", url, *rest])

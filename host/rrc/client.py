@@ -17,10 +17,10 @@ from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
 
 TIMEOUT_US: Final = 200_000
 _SETTLE_US: Final = 100_000
-"""Wait after the dummy command at the start (RRC manual, notes)."""
+"""Wait time after the dummy command at the start (RRC manual, notes)."""
 
 _UNIT_US: Final = 10_000
-"""Times on the wire are multiples of 10 ms."""
+"""Unit of times on the wire, which are multiples of 10 ms."""
 
 _SLOWEST: Final = 1
 
@@ -33,8 +33,8 @@ class RrcClient(Closing):
     Time passes only in the calls of this client. While a watchdog is set, each call renews it in
     time. A program that hangs does not renew the watchdog, and the watchdog stops VR2.
 
-    After `max_refusals` ER lines in a row for one command the client raises RrcStopped. It then
-    sends only `poweroff`, until the RRC is initialized again or `resume` is called.
+    After `max_refusals` ER lines in a row for one command, the client raises RrcStopped. The client
+    then sends only `poweroff`, until the RRC is initialized again or `resume` is called.
 
     Values out of range raise `BadParameters` (a ValueError) before the command is sent. Every
     method that sends a command raises the same errors as `command`.
@@ -46,14 +46,14 @@ class RrcClient(Closing):
     detect exchanged characters. If this matters, compare the values with `statuses`.
 
     Args:
-        link: the open line; the client closes it.
-        timeout_us: how long to wait for the answer to a command, us.
+        link: open line, which the client closes.
+        timeout_us: time to wait for the answer to a command in us.
         max_refusals: number of refusals in a row after which the client stops, 1 or more.
-        on_refusals: the reaction to too many refusals.
-        on_unknown: called with each line that the manual does not list.
+        on_refusals: reaction to too many refusals.
+        on_unknown: function that is called with each line that the manual does not list.
 
     Attributes:
-        unknown: the latest lines that the manual does not list.
+        unknown: latest lines that the manual does not list.
 
     Raises:
         ValueError: `max_refusals` is below 1.
@@ -79,10 +79,10 @@ class RrcClient(Closing):
         """Open a port and start the communication.
 
         Args:
-            url: a device path or pyserial URL, as for `SerialLink`.
+            url: device path or pyserial URL, as for `SerialLink`.
 
         Returns:
-            A started client; close it, or use it in a `with` block.
+            A started client. Close the client, or use it in a `with` block.
 
         Raises:
             LinkClosed: the port cannot be opened.
@@ -97,7 +97,7 @@ class RrcClient(Closing):
         return client
 
     def start(self) -> None:
-        """Start as the manual advises: send a dummy command, wait, empty the buffer.
+        """Start as the manual advises: send a dummy command, wait, and empty the buffer.
 
         Afterwards the client knows whether an earlier program left stablemode on. Lines received
         before the start are dropped, including events.
@@ -124,7 +124,7 @@ class RrcClient(Closing):
             self.command(cmd.DeviceName())
 
     def close(self) -> None:
-        """Close the link; a watchdog that is set will stop VR2."""
+        """Close the link. A watchdog that is set will stop VR2."""
         self._link.close()
 
     @property
@@ -139,22 +139,22 @@ class RrcClient(Closing):
 
     @property
     def watchdog_us(self) -> int:
-        """The time of the watchdog that the client renews, 0 if none is set."""
+        """The time of the watchdog that the client renews, or 0 if no watchdog is set."""
         return self._settings.watchdog_10ms * 10_000
 
     @property
     def stopped(self) -> bool:
-        """Whether the client stopped sending, after too many refusals."""
+        """Whether the client stopped sending after too many refusals."""
         return self._channel.matcher.refusals.stopped is not None
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line received in any call; check its age."""
+        """The newest status line received in any call. Check its age."""
         return self._inbox.latest_status
 
     @property
     def load(self) -> RrcLoad:
-        """The load of the RRC by this client, and its largest rate of lines."""
+        """The load of the RRC that this client causes, and the largest rate of lines."""
         return self._channel.load
 
     def resume(self) -> None:
@@ -168,13 +168,14 @@ class RrcClient(Closing):
         """Send any command and wait until the RRC has processed it.
 
         Args:
-            command: the command.
-            confirm: False to send the command without waiting, for a stream of commands; an ER that
-                arrives later counts as a refusal. By default the client waits for all commands
-                except `output` with stablemode on. It always waits for `stablemode`.
+            command: command to send.
+            confirm: whether to wait for the confirmation. False sends the command without waiting,
+                for a stream of commands. An ER that arrives later then counts as a refusal. By
+                default, the client waits for all commands except `output` with stablemode on. It
+                always waits for `stablemode`.
 
         Returns:
-            The answer to `device`, `version` or `date`; empty for other commands.
+            The answer to `device`, `version` or `date`, empty for other commands.
 
         Raises:
             RrcRefused: the RRC answered ER.
@@ -193,7 +194,7 @@ class RrcClient(Closing):
         """Wait for a time, and receive lines.
 
         Args:
-            duration_us: how long to wait; 0 only reads available lines.
+            duration_us: time to wait in us. 0 only reads available lines.
 
         Raises:
             LinkClosed: the line is gone.
@@ -204,39 +205,39 @@ class RrcClient(Closing):
             self._channel.step(until_us)
 
     def events(self, timeout_us: int) -> Iterator[Arrival[Event]]:
-        """Yield events, the oldest one first.
+        """Yield events. The oldest event is first.
 
         Args:
-            timeout_us: longest wait for each event; then the iteration ends.
+            timeout_us: longest wait for each event. After this time, the iteration ends.
 
         Yields:
-            Each event, with the time at which it arrived.
+            An event with the time at which it arrived.
         """
         return self._drain(self._inbox.events, timeout_us)
 
     def statuses(self, timeout_us: int) -> Iterator[Arrival[StatusA]]:
-        """Yield status lines, the oldest one first.
+        """Yield status lines. The oldest status line is first.
 
         Args:
-            timeout_us: longest wait for each status line; then the iteration ends.
+            timeout_us: longest wait for each status line. After this time, the iteration ends.
 
         Yields:
-            Each status line, with the time at which it arrived.
+            A status line with the time at which it arrived.
         """
         return self._drain(self._inbox.statuses, timeout_us)
 
     def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
-        """Return the first event of a kind; an event received before the call also counts.
+        """Return the first event of a kind. An event received before the call also counts.
 
         Args:
-            kind: the event.
+            kind: kind of the event.
             timeout_us: longest wait.
 
         Returns:
-            The event, with the time at which it arrived.
+            The event with the time at which it arrived.
 
         Raises:
-            LinkTimeout: no such event arrived; the other events are kept.
+            LinkTimeout: no such event arrived. The other events are kept.
         """
         events = self._inbox.events
         until_us = self._link.now_us + timeout_us
@@ -274,12 +275,12 @@ class RrcClient(Closing):
         self.command(cmd.Limit(v_pct, w_pct, sum_pct, product_pct, radius_pct))
 
     def output(self, v_pct: int, w_pct: int, *, confirm: bool | None = None) -> None:
-        """Drive: translation (forward) and rotation (right), -100..100 %.
+        """Drive with translation (forward) and rotation (right), each in -100..100 %.
 
         Args:
-            v_pct: translation.
-            w_pct: rotation.
-            confirm: whether to wait for the confirmation. By default the client waits with
+            v_pct: translation in per cent, forward positive.
+            w_pct: rotation in per cent, right positive.
+            confirm: whether to wait for the confirmation. By default, the client waits with
                 stablemode off, and does not wait with stablemode on.
         """
         self.command(cmd.Output(v_pct, w_pct), confirm=confirm)
@@ -300,76 +301,76 @@ class RrcClient(Closing):
         """Choose the speed mode.
 
         Args:
-            mode: 1 (slowest) to 5.
+            mode: speed mode, 1 (slowest) to 5.
             locked: whether to lock the buttons of the stick that change the speed mode.
         """
         self.command(cmd.SpeedMode(mode, int(locked)))
 
     def joystick(self, shape: cmd.Joystick) -> None:
-        """Set how the stick responds.
+        """Set the response of the stick.
 
         Args:
-            shape: the ten parameters of the command, by name.
+            shape: values of the ten parameters of the command, by name.
         """
         self.command(shape)
 
     def watchdog(self, time_us: int) -> None:
         """Make the RRC stop VR2 after a time without a command.
 
-        From then on the client renews the watchdog in each of its calls.
+        From then on, the client renews the watchdog in each of its calls.
 
         Args:
-            time_us: 0..2_550_000 us, a multiple of 10_000 us; 0 is off.
+            time_us: time in 0..2_550_000 us, a multiple of 10_000 us. 0 switches the watchdog off.
 
         Raises:
-            ValueError: a time out of range.
+            ValueError: the time is out of range.
         """
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
         """Switch stablemode on or off.
 
-        With stablemode the client appends CHECK to each line, and the RRC sends no OK lines.
+        With stablemode, the client appends CHECK to each line, and the RRC sends no OK lines.
 
         Args:
-            on: False to switch it off.
+            on: whether to switch stablemode on.
         """
         self.command(cmd.StableMode(int(on)))
 
     def status(self, *, on: bool = True) -> None:
-        """Switch the stream of status lines on or off: one each 10 ms while VR2 is on.
+        """Switch the stream of status lines on or off. A line comes each 10 ms while VR2 is on.
 
         Args:
-            on: False to switch it off.
+            on: whether to switch the stream on.
         """
         self.command(cmd.Status(int(on)))
 
     def poweroff(self) -> None:
-        """Force VR2 to stop; it must then be switched off by its button."""
+        """Force VR2 to stop. Its power button must then be used to switch it off."""
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:
         """Sound the buzzer.
 
         Args:
-            times_us: durations of on, off, on and so on: up to ten times of 0..2_550_000 us, each a
+            times_us: durations of on, off, on and so on, up to ten times of 0..2_550_000 us, each a
                 multiple of 10_000 us.
 
         Raises:
-            ValueError: a time out of range.
+            ValueError: a time is out of range.
         """
         times = tuple(_units(time_us) for time_us in times_us)
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
-        """Send `output`; before it, select the slowest speed mode if the stick was driving.
+        """Send `output`. If the stick was driving, select the slowest speed mode first.
 
         The manual advises this for every change between limit and output. The client waits for the
         confirmation of the first output. Select the speed mode again afterwards.
 
         Args:
-            v_pct: translation, -100..100 %, forward positive.
-            w_pct: rotation, -100..100 %, right positive.
+            v_pct: translation in -100..100 %, forward positive.
+            w_pct: rotation in -100..100 %, right positive.
         """
         changes = self._slow_down_before(cmd.Output)
         self.output(v_pct, w_pct, confirm=changes or None)
@@ -382,9 +383,9 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Send `limit`; before it, select the slowest speed mode if the host was driving.
+        """Send `limit`. If the host was driving, select the slowest speed mode first.
 
-        The arguments are the arguments of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
+        The arguments are those of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
         """
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)
@@ -400,7 +401,7 @@ class RrcClient(Closing):
                 self._channel.step(until_us)
 
     def _slow_down_before(self, drive: type[cmd.Limit | cmd.Output]) -> bool:
-        """Send speed mode 1 unless this drive is active; return whether it was sent."""
+        """Send speed mode 1 unless this drive is active. Return whether it was sent."""
         settings = self._settings
         changes = settings.drive is not drive
         if changes:

@@ -1,4 +1,4 @@
-"""Gauges of panels, as text: the square of a stick, bars, scales, lamps."""
+"""Gauges of panels as text: the square of a stick, bars, scales and lamps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HALF: Final = 15  # cells of a bar on each side of zero
 
 
 def stick_pad(v_pct: int, w_pct: int) -> Text:
-    """Draw the stick in its square: forward is up, right is right."""
+    """Draw the stick in its square. Forward is up, and right is right."""
     row, column = 5 - round(v_pct / 20), 10 + round(w_pct / 10)
     text = Text()
     for y in range(11):
@@ -28,7 +28,7 @@ def stick_pad(v_pct: int, w_pct: int) -> Text:
 
 
 def signed(percent: int) -> str:
-    """Write -100..100 in four columns."""
+    """Return a number in -100..100 as text of four columns."""
     return f"{percent:+4}" if percent else "   0"
 
 

@@ -1,11 +1,12 @@
-r"""Received lines of the RRC: split, read, sorted and stored.
+r"""Received lines of the RRC, which are split, read, sorted and stored.
 
-Exchanges: one command and the proof that the RRC processed it.
+The module also contains exchanges. An exchange is one command and the proof that the RRC processed
+it.
 
-Without stablemode the proof is `OK:name`. With stablemode the RRC sends no OK. Therefore the client
-sends a `device` query after the command. The RRC processes one line after the other, so the answer
-to the query proves that the command was processed. An ER before this answer is the refusal of the
-command.
+Without stablemode, the proof is `OK:name`. With stablemode, the RRC sends no OK. Therefore the
+client sends a `device` query after the command. The RRC processes one line after the other, so the
+answer to the query proves that the command was processed. An ER before this answer is the refusal
+of the command.
 
 >>> exchange = Exchange(Watchdog(100), stable=True)
 >>> exchange.lines
@@ -44,7 +45,7 @@ _STATUSES_KEPT: Final = 1_000  # 10 s
 UNKNOWN_KEPT: Final = 100
 
 _ANSWER: Final = re.compile(r"(?![A-Z]{2}:)[ -~]+")
-"""A line of text as an answer; a line `XX:...` is a message of newer firmware, not an answer."""
+"""Pattern of a line of text as an answer. A line `XX:...` is a message of newer firmware."""
 
 _T = TypeVar("_T")
 Answer = Ok | Refusal | Text
@@ -56,8 +57,8 @@ class Arrival(Generic[_T]):
     """A received item with its time.
 
     Attributes:
-        at_us: time on the link's clock.
-        value: an `Event`, a `StatusA`, or the text of an unknown line.
+        at_us: time of arrival on the link's clock.
+        value: received item, which is an `Event`, a `StatusA`, or the text of an unknown line.
     """
 
     at_us: int
@@ -65,19 +66,19 @@ class Arrival(Generic[_T]):
 
 
 class Inbox:
-    """Reads lines, stores events and status lines, and returns the others.
+    """An inbox that reads lines, stores events and status lines, and returns the other lines.
 
     Lines that the manual does not list, and SA lines that do not match their CHECK, are kept in
     `unknown` and reported without an error. Newer firmware and noise on the line cause them.
 
     Args:
-        on_unknown: called with each of these lines.
+        on_unknown: function that is called with each of these lines.
 
     Attributes:
-        events: events not yet read.
-        statuses: status lines not yet read.
-        latest_status: the newest status line, whether it was read or not.
-        unknown: the latest unknown lines.
+        events: events that were not read yet.
+        statuses: status lines that were not read yet.
+        latest_status: newest status line, whether it was read or not.
+        unknown: latest unknown lines.
     """
 
     def __init__(self, on_unknown: Callable[[Arrival[str]], None] | None = None) -> None:
@@ -89,7 +90,7 @@ class Inbox:
         self._lines = LineSplitter()
 
     def push(self, now_us: int, data: bytes) -> list[Reply]:
-        """Add received bytes; return the lines that the manual lists, in order."""
+        """Add received bytes. Return the lines that the manual lists, in order."""
         replies = [self._read(now_us, line) for line in self._lines.push(data)]
         return [reply for reply in replies if reply is not None]
 
@@ -142,13 +143,13 @@ class Exchange:
     """A command in progress.
 
     Args:
-        command: the command.
-        stable: whether stablemode is on when it is sent.
+        command: command of the exchange.
+        stable: whether stablemode is on when the command is sent.
 
     Attributes:
-        lines: the bytes to send, line by line.
-        text: the answer to a query, empty for other commands.
-        refusal: the RRC's reason, None without a refusal.
+        lines: bytes to send, line by line.
+        text: answer to a query, empty for other commands.
+        refusal: reason of the RRC's refusal, or None without a refusal.
         done: whether the last expected line has arrived.
     """
 
@@ -167,12 +168,12 @@ class Exchange:
 
     @property
     def sent(self) -> str:
-        """The command's line as text, without LF."""
+        """The line of the command as text, without LF."""
         return self.lines[0].decode().removesuffix("\n")
 
     @property
     def awaited(self) -> str:
-        """The expected end of the exchange, for people."""
+        """The expected end of the exchange, as text for the user."""
         if self._wants_text:
             return f"the answer of {self._last}"
         return f"OK:{self.name}"
@@ -189,15 +190,15 @@ class Exchange:
 
     @property
     def changes_protocol(self) -> bool:
-        """Whether no other command may be sent before this is settled."""
+        """Whether no other command may be sent before this command is settled."""
         return isinstance(self.command, StableMode | Watchdog)
 
     def refuses_barrier_too(self, reason: str) -> bool:
-        """Whether this is the refusal of the query after a command that was refused itself."""
+        """Whether an ER refuses the query after a command that was refused itself."""
         return self.refusal is not None and self.has_barrier and reason == self._last
 
     def take(self, answer: Answer) -> bool:
-        """Handle a line if it belongs to this exchange; return whether it does."""
+        """Handle a line if it belongs to this exchange. Return whether it does."""
         match answer:
             case Refusal(reason):
                 return self._take_refusal(reason)

@@ -1,4 +1,4 @@
-"""The panel of a chair: drive a real or emulated RRC by keys or a game pad (extra `tui`)."""
+"""The panel of a chair, to drive a real or emulated RRC by keys or a game pad (extra `tui`)."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ _STYLES: Final = {"<": "bold cyan", ">": "bold green", "!": "bold red"}
 
 
 class ChairPanel(FramedApp):
-    """Drives and shows a chair.
+    """A panel that drives and shows a chair.
 
     If the terminal is smaller than 80 x 24, the panel draws no square for the stick position. The
     smallest usable size is 60 x 15.
 
     Args:
-        pilot: the pilot that the keys control.
-        url: the port as shown on the screen.
+        pilot: pilot that the keys control.
+        url: URL of the port as shown on the screen.
 
     Attributes:
         interrupted: whether Ctrl-C ended the panel. The terminal sends Ctrl-C as a key, not as a
@@ -128,7 +128,7 @@ class ChairPanel(FramedApp):
         return bool(self.screen_stack and self.screen.has_class("-helps"))
 
     def action_show_help_panel(self) -> None:
-        """Show what the keys do."""
+        """Show the help on the keys."""
         self.screen.add_class("-helps")
         self.refresh_bindings()
 
@@ -171,7 +171,7 @@ class ChairPanel(FramedApp):
         self._pilot.beep()
 
     def action_interrupt(self) -> None:
-        """End as by the signal of Ctrl-C."""
+        """End the panel as the signal of Ctrl-C does."""
         self.interrupted = True
         self.end()
 
@@ -204,7 +204,7 @@ def _pane(name: str, title: str) -> Static:
 
 
 def _state_pane(view: PilotView) -> Text:
-    """Show the driver, its effect, and the reports of the RRC."""
+    """Show the driver, the effect of the driver, and the reports of the RRC."""
     sa, (aim_v, aim_w) = view.status, view.aim_pct
     key = (" DRIVES ", "bold black on green") if view.held else (" released ", "reverse dim")
     who = f" {view.drives.text}"
@@ -234,7 +234,7 @@ def _state_pane(view: PilotView) -> Text:
 
 
 def _lines_pane(view: PilotView, height: int) -> Text:
-    """Show the latest events, the newest at the bottom."""
+    """Show the latest events, with the newest at the bottom."""
     shown = view.lines[max(0, len(view.lines) - height) :]
     rows = [
         Text.assemble((f"{format_time(at_us):>11} ", DIM), (f"{mark} {text}", _STYLES[mark]))
@@ -244,7 +244,7 @@ def _lines_pane(view: PilotView, height: int) -> Text:
 
 
 def run() -> None:
-    """Show the panel until it is closed; then stop the chair."""
+    """Show the panel until it is closed. Then stop the chair."""
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None
     ended = Ended()
@@ -268,11 +268,11 @@ def run() -> None:
 
 
 class _Stepper:
-    """Steps a pilot in its own thread, for the duration of a `with` block.
+    """A thread that steps a pilot during a `with` block.
 
     Args:
-        pilot: the pilot.
-        failed: called from that thread if the line fails.
+        pilot: pilot to step.
+        failed: function that is called from that thread if the line fails.
     """
 
     def __init__(self, pilot: Pilot, failed: Callable[[], None]) -> None:
@@ -290,7 +290,7 @@ class _Stepper:
         self._thread.join()
 
     def raise_failure(self) -> None:
-        """Raise what ended the thread."""
+        """Raise the error that ended the thread."""
         if self._failure is not None:
             raise self._failure
 

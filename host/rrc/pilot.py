@@ -26,7 +26,7 @@ class Drives(StrEnum):
 
     @property
     def text(self) -> str:
-        """The text for people."""
+        """Text of the driver for the user."""
         return "stopped" if self is Drives.STOPPED else f"{self} drives"
 
 
@@ -34,27 +34,27 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return the values to drive in per cent, 0 while no button is held.
+        """Return the values to drive in per cent, which are 0 while no button is held.
 
-        Raises ChairStopped if the pad is gone.
+        The method raises ChairStopped if the pad is gone.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PilotView:
-    """The state at one time.
+    """The state of panel and chair at one time.
 
     Attributes:
-        now_us: the time.
-        drives: who drives the chair.
-        aim_pct: values driven while the dead-man key is held.
+        now_us: time of the state.
+        drives: driver of the chair.
+        aim_pct: values driven while the dead-man key is held, in per cent.
         held: whether the dead-man key is held.
-        speed_mode: the chosen speed mode.
-        most_pct: the limit of the stick, in per cent.
-        status: the latest status line, None while VR2 is off.
-        load: load of the RRC by this program.
-        lines: events and actions, `(time, mark, text)`.
+        speed_mode: speed mode that was chosen.
+        most_pct: limit of the stick in per cent.
+        status: latest status line, or None while VR2 is off.
+        load: load of the RRC that this program causes.
+        lines: events and actions as `(time, mark, text)`.
     """
 
     now_us: int
@@ -69,14 +69,14 @@ class PilotView:
 
 
 class Pilot:
-    """Steps a chair in one thread, while another one controls and reads it.
+    """A pilot that steps a chair in one thread, while another thread controls and reads it.
 
     Args:
-        chair: the chair, protected by a guard.
-        pad: a game pad that is used instead of the keys.
+        chair: chair that a guard protects.
+        pad: game pad that is used instead of the keys, or None.
 
     Attributes:
-        view: the present state.
+        view: present state of panel and chair.
     """
 
     def __init__(self, chair: Chair, pad: _PadStick | None = None) -> None:

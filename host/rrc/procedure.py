@@ -45,15 +45,15 @@ class _Operator(Protocol):
         """Show an instruction."""
 
     def confirms(self, question: str) -> bool:
-        """Ask a question; Quit ends the procedure."""
+        """Ask a question. Quit ends the procedure."""
         ...
 
     def waits(self) -> None:
-        """Wait a moment; Quit ends the procedure."""
+        """Wait a moment. Quit ends the procedure."""
 
 
 class Quit(Exception):  # noqa: N818 - what the operator did
-    """The operator ends the procedure."""
+    """The operator ended the procedure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +61,9 @@ class StepResult:
     """The result of a step.
 
     Attributes:
-        step: its title.
-        sent: the sample line, without CHECK; empty if the step sends no line.
-        check: the CHECK of this line; empty in the first round.
+        step: title of the step.
+        sent: sample line without CHECK, empty if the step sends no line.
+        check: CHECK of the sample line, empty in the first round.
         passed: whether the RRC behaved as described in the manual.
         reason: the reason of a failure.
     """
@@ -76,20 +76,20 @@ class StepResult:
 
 
 class _Failed(Exception):  # noqa: N818 - the verdict
-    """The RRC, or the chair, behaved differently."""
+    """The RRC or the chair behaved differently from the manual."""
 
 
 @dataclass(slots=True)
 class Procedure:
-    """Runs the steps of both rounds.
+    """A procedure that runs the steps of both rounds.
 
     Args:
-        chair: protected by its watchdog, without stablemode.
-        operator: the person at the chair.
-        report: called with each result.
+        chair: chair with its watchdog, without stablemode.
+        operator: person at the chair.
+        report: function that is called with each result.
 
     Attributes:
-        results: of all steps so far.
+        results: results of all steps so far.
     """
 
     chair: Chair
@@ -106,7 +106,7 @@ class Procedure:
         """Run all steps.
 
         Raises:
-            Quit: the operator ended it.
+            Quit: the operator ended the procedure.
             LinkError: the RRC is gone.
         """
         if not self.operator.confirms("Are the wheels off the ground, and is the chair empty?"):
@@ -133,7 +133,7 @@ class Procedure:
     def _start(self, step: str) -> None:
         """Ask the operator to switch VR2 on.
 
-        Raises Quit if VR2 stays off, because all other steps need it.
+        The method raises Quit if VR2 stays off, because all other steps need it.
         """
         self._step(step, None, self._power_on)
         if not self.results[-1].passed:
@@ -263,7 +263,7 @@ class Procedure:
     def _await(
         self, holds: Callable[[StatusA], bool], what: str, within_us: int = _PATIENCE_US
     ) -> StatusA:
-        """Wait until a status line meets a condition, and return a later one with its effect."""
+        """Wait until a status line meets a condition. Return a later line that shows the effect."""
         client = self.chair.client
         until_us = client.now_us + within_us
         while client.now_us < until_us:

@@ -1,4 +1,4 @@
-"""Assignment of the replies of an RRC to commands, and its consequences."""
+"""Assignment of the replies of an RRC to commands, and the consequences of replies."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tickrig.wire.rrc.replies import Ok, Refusal, Text
 # Refusals are counted for each command by itself. Who stops, and how, is in channel.py.
 
 _SETTLED_US: Final = 100_000
-"""Time after which a missing ER can no longer arrive: 10 periods of the RRC."""
+"""Time after which a missing ER can no longer arrive, which is 10 periods of the RRC."""
 
 _MOTION: Final = ("output", "limit")
 
@@ -51,16 +51,16 @@ class OnRefusals(Enum):
 
 
 class _RefusalCounter:
-    """Counts for each command how many times in a row it was refused.
+    """A counter of successive refusals for each command.
 
     Each command is counted separately, so that an accepted `beep` in between does not hide that
     every `output` is refused.
 
     Args:
-        limit: number of refusals in a row that is too many.
+        limit: number of successive refusals that is too many.
 
     Attributes:
-        stopped: reason of the last refusal after too many refusals, otherwise None.
+        stopped: reason of the last refusal after too many refusals, or None.
 
     Raises:
         ValueError: the limit is below 1.
@@ -74,11 +74,11 @@ class _RefusalCounter:
         self._rows: Counter[str] = Counter()
 
     def accepted(self, name: str) -> None:
-        """Register an executed command, which ends its row."""
+        """Record an executed command, which ends its series of refusals."""
         del self._rows[name]
 
     def refused(self, name: str, reason: str) -> None:
-        """Register a refusal; `stopped` is set if it is one too many."""
+        """Record a refusal. `stopped` is set if it is one too many."""
         self._rows[name] += 1
         if self.stopped is None and self._rows[name] >= self.limit:
             self.stopped = reason
@@ -94,10 +94,11 @@ class _BelievedSettings:
     """Known settings of the RRC that affect the client.
 
     Attributes:
-        stable: whether stablemode is on: every line has a CHECK, and the RRC sends no OK.
-        watchdog_10ms: time of the watchdog in units of 10 ms, 0 is off.
+        stable: whether stablemode is on. With stablemode, every line has a CHECK, and the RRC sends
+            no OK.
+        watchdog_10ms: time of the watchdog in units of 10 ms. 0 means that the watchdog is off.
         locked: whether the controller's speed buttons are locked.
-        drive: the command that chose who drives, None if unknown.
+        drive: command that chose who drives, or None if unknown.
     """
 
     stable: bool = False
@@ -106,14 +107,14 @@ class _BelievedSettings:
     drive: type[Limit | Output] | None = None
 
     def sent(self, command: Command) -> None:
-        """Register a command that was sent without waiting; who drives may have changed."""
+        """Record a command that was sent without waiting. The driver may have changed."""
         if isinstance(command, Limit | Output) and self.drive is not type(command):
             self.drive = None
         else:
             self.accepted(command)
 
     def accepted(self, command: Command) -> None:
-        """Register a command that the RRC executed."""
+        """Record a command that the RRC executed."""
         match command:
             case StableMode(on):
                 self.stable = bool(on)
@@ -139,7 +140,7 @@ class _Sent(NamedTuple):
 
 
 class _UnconfirmedCommands:
-    """Commands sent without waiting, each kept until its reply or its time-out.
+    """Commands sent without waiting. Each command is kept until its reply or its time-out.
 
     Replies arrive in the order of the commands, so a reply belongs to the oldest command of its
     name. An ER without a name is assigned to a motion command if one is pending, because this is
@@ -152,23 +153,23 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """When the last command sent before a restart times out; 0 if none is pending."""
+        """Time-out of the last command sent before a restart, or 0 if none is pending."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 
     def doubt(self) -> None:
-        """Register that the RRC was initialized: commands in its buffer are still pending."""
+        """Record that the RRC was initialized. Commands in its buffer are still pending."""
         if self._sent:
             self._doubted_us = self._sent[-1].at_us
 
     def add(self, now_us: int, command: Command) -> None:
-        """Register a sent command."""
+        """Record a sent command."""
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Remove the command of an OK; return the newest of its name.
+        """Remove the command of an OK. Return the newest command with its name.
 
-        The newest command counts, because the RRC has executed it or will execute it. The
+        The newest command counts, because the RRC has executed it or will execute it. There is one
         exception: the RRC lost its power together with older commands, and this OK is the reply to
         the newest command.
         """
@@ -179,7 +180,7 @@ class _UnconfirmedCommands:
         return same[-1].command
 
     def refused(self, reason: str) -> str | None:
-        """Remove the command of an ER, and return its name."""
+        """Remove the command of an ER. Return its name."""
         wanted = (*_MOTION, None) if reason in NAMELESS else (reason,)
         for name in wanted:
             for sent in self._sent:
@@ -189,29 +190,29 @@ class _UnconfirmedCommands:
         return None
 
     def settle(self, now_us: int) -> list[str]:
-        """Remove the commands that got no reply in time; return their names."""
+        """Remove the commands that got no reply in time. Return their names."""
         settled = []
         while self._sent and self._sent[0].at_us + _SETTLED_US <= now_us:
             settled.append(self._sent.popleft().name)
         return settled
 
     def take_all(self) -> list[str]:
-        """Remove all commands; return their names."""
+        """Remove all commands. Return their names."""
         names = [sent.name for sent in self._sent]
         self._sent.clear()
         return names
 
 
 class ReplyMatcher:
-    """Assigns each reply to its command.
+    """A matcher that assigns each reply to its command.
 
     Args:
-        max_refusals: number of refusals in a row that is too many, 1 or more.
+        max_refusals: number of successive refusals that is too many, 1 or more.
 
     Attributes:
         settings: known settings of the RRC.
-        refusals: refusals in a row.
-        unconfirmed: commands sent without waiting.
+        refusals: counter of successive refusals.
+        unconfirmed: commands that were sent without waiting.
     """
 
     def __init__(self, max_refusals: int) -> None:
@@ -220,12 +221,12 @@ class ReplyMatcher:
         self.unconfirmed = _UnconfirmedCommands()
 
     def sent(self, now_us: int, command: Command) -> None:
-        """Register a command sent without waiting."""
+        """Record a command that was sent without waiting."""
         self.unconfirmed.add(now_us, command)
         self.settings.sent(command)
 
     def take(self, reply: Answer, exchange: Exchange | None) -> bool:
-        """Process a reply; return False if no command expects it."""
+        """Process a reply. Return False if no command expects the reply."""
         match reply:
             case Refusal(reason):
                 counts = exchange is None or not exchange.refuses_barrier_too(reason)
@@ -249,9 +250,9 @@ class ReplyMatcher:
             self.refusals.accepted(name)
 
     def initialized(self) -> None:
-        """Register that the RRC was initialized: all known settings are lost.
+        """Record that the RRC was initialized, so that all known settings are lost.
 
-        A command that waited in its receive buffer is still executed afterwards.
+        A command that waited in the receive buffer of the RRC is still executed afterwards.
         """
         self.settings.clear()
         self.refusals.clear()
@@ -267,8 +268,8 @@ class ReplyMatcher:
 
         Commands are answered in order, so the oldest candidate is assumed. With stablemode,
         executed commands have no answer, and the oldest candidate may not be the refused command.
-        Then the awaited command is assumed: it is better to report an accepted setting as refused
-        than the other way round.
+        In this case, the awaited command is assumed. It is better to report an accepted setting as
+        refused than the other way round.
         """
         if exchange is not None and exchange.has_barrier and exchange.take(refusal):
             return exchange.name
@@ -277,7 +278,7 @@ class ReplyMatcher:
         return exchange.name if exchange is not None and exchange.take(refusal) else ""
 
     def _take_unawaited(self, name: str, exchange: Exchange | None) -> bool:
-        """Process an OK to a command sent without waiting; return False if it is not one."""
+        """Process an OK to a command sent without waiting. Return False for any other OK."""
         in_doubt = self.unconfirmed.doubt_ends_us > 0
         command = self.unconfirmed.carried_out(name)
         if command is None:

@@ -1,4 +1,4 @@
-"""What the verbs of `rrc` do."""
+"""The work of the verbs of `rrc`."""
 
 from __future__ import annotations
 
@@ -42,37 +42,38 @@ _FIELDS: Final = {
     "speed_down_count": "speed_down_count",
     "alarm_count": "alarm_count",
 }
-"""What is printed of a status line, by the names that inputs and outputs of the emulator have."""
+"""Values that are printed of a status line, under the emulator's names of inputs and outputs."""
 
 _MOST_BEEPS: Final = 10
 _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """The signal that was received; the loops check it, and no call is interrupted.
+    """The signal that was received. The loops check it, and no call is interrupted.
 
     Attributes:
-        number: number of the first signal, 0 if no signal was received.
+        number: number of the first signal, or 0 if no signal was received.
     """
 
     number = 0
 
     def received(self, number: int, frame: FrameType | None) -> None:
-        """Take a signal."""
+        """Record a signal."""
         self.number = self.number or number
 
 
 @contextmanager
 def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
-    """Open the port of this call and guard the chair; at the end stop it, and end the command.
+    """Open the port of this call and guard the chair. At the end, stop it, and end the command.
 
     Args:
-        ended: receives the signals.
-        stable: whether stablemode is switched on, unless the call says otherwise.
+        ended: object that records the signals.
+        stable: whether stablemode is switched on, unless the call requires otherwise.
 
     Raises:
-        click.ClickException: the command failed; the message is one line; exit status 1 or 3.
-        KeyboardInterrupt: a signal was received; raised after the chair was stopped.
+        click.ClickException: the command failed. The message is one line, and the exit status is 1
+            or 3.
+        KeyboardInterrupt: a signal was received. It is raised after the chair was stopped.
     """
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None
@@ -105,7 +106,7 @@ def _lost(call: RrcCall, error: LinkError, chair: Chair | None) -> str:
 
 
 def described(status: StatusA) -> dict[str, int]:
-    """Return what a status line says, by the names of the emulator."""
+    """Return the values in a status line, under the names of the emulator."""
     values = asdict(status)
     return {shown: values[name] for name, shown in _FIELDS.items()}
 
@@ -139,16 +140,16 @@ class _DriveInput(Protocol):
     def poll(self, now_us: int) -> tuple[int, int]:
         """Return the values to drive now, in per cent.
 
-        Raises ChairStopped if the terminal or the pad is gone.
+        The method raises ChairStopped if the terminal or the pad is gone.
         """
         ...
 
     def close(self) -> None:
-        """Give keys or pad back."""
+        """Release the keys or the pad."""
 
 
 class _Script:
-    """Drives without a dead-man key."""
+    """An input that drives without a dead-man key."""
 
     hint, leaves = "", False
 
@@ -159,11 +160,11 @@ class _Script:
         return self._drive
 
     def close(self) -> None:
-        """Nothing is taken."""
+        """Do nothing, because there is nothing to release."""
 
 
 class _Keys:
-    """Drives while SPACE comes from the terminal."""
+    """An input that drives while SPACE arrives from the terminal."""
 
     hint, leaves = "   SPACE drives, q ends", False
 
@@ -189,7 +190,7 @@ class _Keys:
 
 
 class _PadHand:
-    """Drives by the left stick of a game pad while one of its buttons is held.
+    """An input that drives by the left stick of a game pad while one of its buttons is held.
 
     Args:
         path: path of the pad.
@@ -205,7 +206,7 @@ class _PadHand:
         self.close = self._pad.close
 
     def poll(self, now_us: int) -> tuple[int, int]:
-        """Return the values of the stick; 0 while no button is held."""
+        """Return the values of the stick, which are 0 while no button is held."""
         try:
             hand = self._pad.poll(now_us)
         except LinkClosed as error:
@@ -217,7 +218,7 @@ class _PadHand:
 
 
 def open_pad(path: str, v_pct: int = 100, w_pct: int = 100) -> _PadHand:
-    """Open a game pad; Refused if it cannot be."""
+    """Open a game pad. Raise Refused if that fails."""
     try:
         return _PadHand(path, v_pct, w_pct)
     except LinkClosed as error:
@@ -236,7 +237,7 @@ def _drive_input(v_pct: int, w_pct: int, for_us: int | None, *, no_dead_man: boo
 
 
 class _Line:
-    """One line of the terminal, written again and again; without a terminal, no output.
+    """One line of the terminal that is overwritten repeatedly. Without a terminal, it is not shown.
 
     A terminal that accepts no data does not delay the chair.
 
@@ -386,8 +387,9 @@ class _TerminalOperator:
     """The person who reads standard error and types answers.
 
     Args:
-        chair: called while the program waits for an answer, so that the watchdog is renewed.
-        ended: a signal ends the procedure.
+        chair: chair that is stepped while the program waits for an answer, so that the watchdog is
+            renewed.
+        ended: signal that ends the procedure.
     """
 
     def __init__(self, chair: Chair, ended: Ended) -> None:

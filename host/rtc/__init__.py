@@ -1,4 +1,7 @@
-"""RT components after OMG RTC 1.0 and OpenRTM-aist 1.x, in one process, which is given the time."""
+"""RT components after OMG RTC 1.0 and OpenRTM-aist 1.x, in one process.
+
+The caller passes the time.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -8,6 +11,6 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> object:
-    """Return a name of the model: the commands here start without it."""
+    """Return a name of the model. Commands that import this package start without the model."""
     found: object = getattr(import_module(f"{__name__}.model"), name)
     return found

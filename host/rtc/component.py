@@ -77,10 +77,10 @@ P = TypeVar("P", bound=AnyPort)
 def guarded(
     who: str, callback: Callable[A, ReturnCode], *args: A.args, **kwargs: A.kwargs
 ) -> ReturnCode:
-    """Run a callback; an exception is logged and counts as RTC_ERROR.
+    """Run a callback. An exception is logged and counts as RTC_ERROR.
 
-    Any exception is caught, also from listeners of ports, so that one component cannot end the
-    others.
+    Any exception is caught, also an exception of a listener of a port, so that one component cannot
+    end the others.
     """
     try:
         return callback(*args, **kwargs)
@@ -89,66 +89,69 @@ def guarded(
 
 
 def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
-    """Log the exception that a callback has raised; it counts as RTC_ERROR."""
+    """Log the exception that a callback has raised. The exception counts as RTC_ERROR."""
     _LOG.exception("%s: %s raised", who, callback.__name__)
     return ReturnCode.RTC_ERROR
 
 
 class ComponentAction:
-    """The callbacks of a component; each does nothing until a subclass overrides it.
+    """The callbacks of a component. Each callback does nothing until a subclass overrides it.
 
-    A callback returns RTC_OK or an error code. After an error code the component goes to Error,
+    A callback returns RTC_OK or an error code. After an error code, the component goes to Error,
     unless the docstring of the callback says otherwise. An exception is logged and counts as
-    RTC_ERROR. Callbacks must not wait: time passes only between them. The argument `ec` is the
-    execution context that runs the callback; the time is `ec.now_us`.
+    RTC_ERROR. Callbacks must not wait, because time passes only between them. The argument `ec` is
+    the execution context that runs the callback. The time is `ec.now_us`.
     """
 
     def on_initialize(self) -> ReturnCode:
-        """Begin; it stays Created if this returns another code than RTC_OK."""
+        """Initialize the component. It stays Created unless this callback returns RTC_OK."""
         return _OK
 
     def on_finalize(self) -> ReturnCode:
-        """End, whatever this returns."""
+        """Finalize the component. The return value is ignored."""
         return _OK
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
-        """Take the start of the execution context `ec`."""
+        """React to the start of the execution context `ec`."""
         return _OK
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
-        """Take the stop of the execution context `ec`."""
+        """React to the stop of the execution context `ec`."""
         return _OK
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """Take another rate of the execution context `ec`."""
+        """React to a new rate of the execution context `ec`."""
         return _OK
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Become Active in `ec`."""
+        """React to the move to Active in `ec`."""
         return _OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Active in `ec`, for Inactive or for Error."""
+        """React to the move from Active to Inactive or to Error in `ec`."""
         return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Work, once a period of `ec` in Active: the first pass."""
+        """Do the work of a period of `ec` in Active. This is the first pass."""
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Work, once a period in Active, after on_execute of every component of `ec`."""
+        """Do the work of a period in Active, after on_execute of every component of `ec`."""
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
-        """Enter Error in `ec`; what this returns is ignored."""
+        """React to the move to Error in `ec`. The return value is ignored."""
         return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Work, once a period of `ec` in Error; what this returns is ignored."""
+        """Do the work of a period of `ec` in Error. The return value is ignored."""
         return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Error in `ec`, if this returns RTC_OK: for Inactive."""
+        """React to a reset in Error.
+
+        If this returns RTC_OK, the component moves to Inactive in `ec`.
+        """
         return _OK
 
 
@@ -157,10 +160,10 @@ class ModuleSpec:
     """The properties that all components of a class share (OpenRTM-aist 1.x, module profile).
 
     Attributes:
-        type_name: of the class, such as `ConsoleIn`.
-        description: one line of text.
-        version: of the class.
-        vendor: who made it.
+        type_name: name of the class, such as `ConsoleIn`.
+        description: description of the class in one line.
+        version: version of the class.
+        vendor: vendor of the class.
         category: purpose of the class, such as `sensor`.
     """
 
@@ -173,7 +176,7 @@ class ModuleSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentProfile(ModuleSpec):
-    """A component as OpenRTM describes it: what its class has, and what it has itself."""
+    """A component as OpenRTM describes it, with properties of its class and its own properties."""
 
     instance_name: str
     port_profiles: tuple[PortProfile, ...]
@@ -181,7 +184,7 @@ class ComponentProfile(ModuleSpec):
 
 
 class RtComponent(ComponentAction):
-    """An RT component: life cycle, ports and configuration (OMG RTC 1.0, LightweightRTObject).
+    """An RT component with life cycle, ports and configuration (OMG RTC 1.0, LightweightRTObject).
 
     A subclass has a `spec`, makes its ports and parameters in the constructor
     (`add_port`, `configuration.bind`), and overrides the callbacks that it needs
@@ -191,15 +194,16 @@ class RtComponent(ComponentAction):
     addition to the state of the life cycle.
 
     Args:
-        instance_name: unique in a system, such as `ConsoleIn0`.
+        instance_name: name that is unique in a system, such as `ConsoleIn0`.
 
     Attributes:
-        spec: properties that all components of the class share; each subclass sets it.
-        instance_name: as above.
-        alive: True between `initialize` and `finalize`.
-        configuration: its configuration sets; one of them is active.
-        ports: by name, in the order in which they were added.
-        contexts: execution contexts it takes part in; the first decides its state.
+        spec: properties that all components of the class share. Each subclass sets them.
+        instance_name: name that is unique in a system, such as `ConsoleIn0`.
+        alive: whether the component is alive, which is True between `initialize` and `finalize`.
+        configuration: configuration sets of the component. One of the sets is active.
+        ports: ports by name, in the order in which they were added.
+        contexts: execution contexts in which the component takes part. The first context decides
+            its state.
         own_contexts: execution contexts that end with the component.
     """
 
@@ -214,7 +218,7 @@ class RtComponent(ComponentAction):
 
     @property
     def profile(self) -> ComponentProfile:
-        """The component as it is."""
+        """Profile of the component in its present state."""
         ports = tuple(port.profile for port in self.ports.values())
         return ComponentProfile(
             **asdict(self.spec), instance_name=self.instance_name, port_profiles=ports
@@ -224,10 +228,10 @@ class RtComponent(ComponentAction):
         """Add a port.
 
         Args:
-            port: a data port or service port.
+            port: data port or service port to add.
 
         Returns:
-            The port itself.
+            The added port.
 
         Raises:
             RtcRefused: another port of the component has this name.
@@ -239,7 +243,7 @@ class RtComponent(ComponentAction):
         return port
 
     def remove_port(self, port: AnyPort) -> None:
-        """End a port's connectors and take it away."""
+        """End the connectors of a port and remove the port."""
         port.disconnect_all()
         del self.ports[port.name]
         port.owner = ""
@@ -248,7 +252,7 @@ class RtComponent(ComponentAction):
         """Take part in an execution context that ends with this component.
 
         Args:
-            context: the execution context.
+            context: execution context that the component will own.
 
         Returns:
             The result of `ExecutionContext.add_component`.
@@ -262,8 +266,8 @@ class RtComponent(ComponentAction):
         """Call on_initialize, make the component alive, and start its own execution contexts.
 
         Returns:
-            PRECONDITION_NOT_MET unless the component is Created; else the result of
-            on_initialize. If that is not RTC_OK, the component stays Created.
+            PRECONDITION_NOT_MET unless the component is Created. Otherwise, the result of
+            on_initialize. If that result is not RTC_OK, the component stays Created.
         """
         if self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -279,7 +283,7 @@ class RtComponent(ComponentAction):
 
         Returns:
             PRECONDITION_NOT_MET in Created, or while the component takes part in an execution
-            context; else the result of on_finalize.
+            context. Otherwise, the result of on_finalize.
         """
         if not self.alive or self.contexts:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -287,13 +291,13 @@ class RtComponent(ComponentAction):
         return guarded(self.instance_name, self.on_finalize)
 
     def exit(self) -> ReturnCode:
-        """Leave all execution contexts, stop the contexts that it owns, and finalize.
+        """Leave all execution contexts, stop the contexts that the component owns, and finalize.
 
         If the component is Active, on_deactivated is called first. Other components are removed
-        from the contexts that it owns. Do not call this method from a callback.
+        from the contexts that this component owns. Do not call this method from a callback.
 
         Returns:
-            PRECONDITION_NOT_MET in Created; else the result of on_finalize.
+            PRECONDITION_NOT_MET in Created. Otherwise, the result of on_finalize.
         """
         if not self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -320,8 +324,8 @@ class _Participant:
     """A component as its execution context sees it.
 
     Attributes:
-        state: the present state; Created after the component was removed.
-        wanted: the state to which the next pre-pass moves the component, if any.
+        state: present state, or Created after the component was removed.
+        wanted: state to which the next pre-pass moves the component, or None.
     """
 
     __slots__ = ("_context", "_updates", "component", "state", "wanted")
@@ -334,26 +338,32 @@ class _Participant:
         self._updates = type(component).on_state_update is not base
 
     def request(self, source: LifeCycleState, wanted: LifeCycleState) -> ReturnCode:
-        """Ask for a move; PRECONDITION_NOT_MET unless in `source` and not on the way to Error."""
+        """Request a move.
+
+        Return PRECONDITION_NOT_MET unless in `source` and not moving to Error.
+        """
         if self.state is not source or self.wanted is _ERROR:
             return ReturnCode.PRECONDITION_NOT_MET
         self.wanted = wanted
         return _OK
 
     def abort(self) -> None:
-        """Move to Error in the next pre-pass; nothing if it is there."""
+        """Move to Error in the next pre-pass. Do nothing if the component is in Error."""
         if self.state is not _ERROR:
             self.wanted = _ERROR
 
     def notify(self, callback: _Callback) -> ReturnCode:
-        """Run a callback and return its code; if it fails, Error comes next."""
+        """Run a callback and return its code.
+
+        If the callback fails, the component moves to Error next.
+        """
         code = self._call(callback)
         if code is not _OK:
             self.abort()
         return code
 
     def pre(self) -> None:
-        """First pass of a period: make the move that is wanted."""
+        """Make the wanted move, in the first pass of a period."""
         if self.component.configuration.changed:
             self.notify(self._update_configuration)
         if (wanted := self.wanted) is not None:
@@ -363,7 +373,7 @@ class _Participant:
                 self._report(code)
 
     def do(self) -> None:
-        """Second pass of a period: the work of the state."""
+        """Do the work of the state, in the second pass of a period."""
         if self.state is _ACTIVE:
             if self.wanted is not _ERROR and self._call(self.component.on_execute) is not _OK:
                 self.wanted = _ERROR
@@ -371,12 +381,12 @@ class _Participant:
             self._call(self.component.on_error)
 
     def post(self) -> None:
-        """Third pass of a period, after the second one of all participants."""
+        """Do the third pass of a period, after the second pass of all participants."""
         if self._updates and self.state is _ACTIVE and self.wanted is not _ERROR:
             self.notify(self.component.on_state_update)
 
     def leave(self) -> None:
-        """Leave Active at once, as a component that ends does; the state is Created."""
+        """Leave Active at once, as a component that ends does. The state is then Created."""
         code = self._call(self.component.on_deactivated) if self.state is _ACTIVE else _OK
         left, self.state, self.wanted = self.state is not _CREATED, _CREATED, None
         if left and self._context.on_move:
@@ -442,8 +452,8 @@ class ExecutionContexts:
     which would take 11 us of each tick with 127 contexts.
 
     Attributes:
-        quiet_us: the time of the latest tick in which no context was due; the contexts do not
-            store this time.
+        quiet_us: time of the latest tick in which no context was due. The contexts do not store
+            this time.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")
@@ -454,7 +464,7 @@ class ExecutionContexts:
 
     @property
     def due_us(self) -> int:
-        """When the next period of one begins; `NEVER` while none runs."""
+        """Begin of the next period of a context, or `NEVER` while no context runs."""
         if not self._known:
             self._known = True
             self._due_us = min((context.due_us for context in self._contexts), default=NEVER)
@@ -464,7 +474,7 @@ class ExecutionContexts:
         """Run a period of each context that is due.
 
         Args:
-            now_us: the current time; never less than before.
+            now_us: current time, which is never less than before.
         """
         if now_us < self.due_us:
             self.quiet_us = now_us
@@ -473,11 +483,11 @@ class ExecutionContexts:
             context.tick(now_us)
 
     def replan(self) -> None:
-        """Take note that one of them is due at another time than before."""
+        """Record that the due time of a context has changed."""
         self._known = False
 
     def add(self, context: ExecutionContext, now_us: int) -> None:
-        """Tick a context from now on; one that is ticked already is no error."""
+        """Tick a context from now on. Adding a context twice has no effect."""
         if context not in self._contexts:
             context.tick(now_us)
             self._contexts.append(context)
@@ -485,7 +495,7 @@ class ExecutionContexts:
             self.replan()
 
     def remove(self, context: ExecutionContext) -> None:
-        """Tick a context no more."""
+        """Stop ticking a context."""
         self._contexts.remove(context)
         context.join(ExecutionContexts())
         self.replan()
@@ -495,29 +505,32 @@ MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
 
 
 class ExecutionContext:
-    """Runs components period by period: three passes over all of them, in the order of adding.
+    """An execution context, which runs components period by period.
+
+    Each period has three passes over all components, in the order of adding:
 
     - pre: requested moves (activate, deactivate, reset, abort);
     - do: on_execute in Active, on_error in Error;
     - post: on_state_update in Active.
 
-    Requests are checked when they are made, and take effect in the next period; they do not wait.
-    Periods begin at the multiples of `period_us`. The kind of the context is PERIODIC; EVENT_DRIVEN
-    and OTHER are not emulated.
+    Requests are checked when they are made, and take effect in the next period. The requests do not
+    wait. Periods begin at the multiples of `period_us`. The kind of the context is PERIODIC.
+    EVENT_DRIVEN and OTHER are not emulated.
 
     Args:
-        rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
+        rate_hz: number of periods per second, 1 uHz to 1 MHz. A period is a whole number of
+            microseconds.
 
     Attributes:
-        due_us: when the next period begins; `NEVER` while the context is stopped.
-        rate_hz: periods a second.
+        due_us: begin of the next period, or `NEVER` while the context is stopped.
+        rate_hz: number of periods per second.
         period_us: length of a period.
-        running: True between start and stop.
-        allows_period: called with each new period in us, where not all periods are possible;
-            returns whether this one is.
-        on_move: called after each move with the component, its state and the result of the
-            callback of the move. It is also called if on_reset failed and the component stayed in
-            Error. The state is Created if the component left the context.
+        running: whether the context runs, which is True between start and stop.
+        allows_period: function that is called with each new period in us, if not all periods are
+            possible. It returns whether the period is possible.
+        on_move: function that is called after each move with the component, its state and the
+            result of the callback of the move. It is also called if on_reset failed and the
+            component stayed in Error. The state is Created if the component left the context.
 
     Raises:
         ValueError: the rate is out of range.
@@ -538,7 +551,7 @@ class ExecutionContext:
 
     @property
     def now_us(self) -> int:
-        """The time of the latest tick; what callbacks take as the present."""
+        """The time of the latest tick, which is the present time for callbacks."""
         ticked_us, quiet_us = self._ticked_us, self._others.quiet_us
         return ticked_us if ticked_us > quiet_us else quiet_us  # noqa: FURB136 - twice as fast
 
@@ -567,7 +580,8 @@ class ExecutionContext:
         """Start the context, and call on_startup of every participant.
 
         Returns:
-            PRECONDITION_NOT_MET if the context runs or a participant is not alive.
+            PRECONDITION_NOT_MET if the context runs or a participant is not alive. Otherwise,
+            RTC_OK.
         """
         if self.running or not all(component.alive for component in self.components):
             return ReturnCode.PRECONDITION_NOT_MET
@@ -577,10 +591,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def stop(self) -> ReturnCode:
-        """Stop the context, and call on_shutdown of every participant; their states do not change.
+        """Stop the context, and call on_shutdown of every participant. Their states do not change.
 
         Returns:
-            PRECONDITION_NOT_MET unless the context runs.
+            PRECONDITION_NOT_MET unless the context runs. Otherwise, RTC_OK.
         """
         if not self.running:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -590,15 +604,15 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def join(self, others: ExecutionContexts) -> None:
-        """Join a group of contexts, as its last one; called by `Manager`.
+        """Join a group of contexts as its last context. `Manager` calls this method.
 
         Args:
-            others: the group; notified when the due time of this context changes.
+            others: group of contexts, which is notified when the due time of this context changes.
         """
         self._ticked_us, self._others = self.now_us, others
 
     def close(self) -> None:
-        """Deactivate all participants at once, stop, and let them go."""
+        """Deactivate all participants at once, stop the context, and remove all participants."""
         for participant in self._participants:
             participant.leave()
         self.stop()
@@ -609,10 +623,11 @@ class ExecutionContext:
         """Change the rate, and call on_rate_changed of every participant.
 
         Args:
-            rate_hz: periods a second.
+            rate_hz: number of periods per second.
 
         Returns:
             BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz and the period of the rate is allowed.
+            Otherwise, RTC_OK.
         """
         if not _possible(rate_hz):
             return ReturnCode.BAD_PARAMETER
@@ -628,10 +643,10 @@ class ExecutionContext:
         """Add a component as the last participant, in the state Inactive.
 
         Args:
-            component: the component.
+            component: component to add.
 
         Returns:
-            PRECONDITION_NOT_MET if the component takes part already.
+            PRECONDITION_NOT_MET if the component takes part already. Otherwise, RTC_OK.
         """
         if self._find(component) is not None:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -644,10 +659,11 @@ class ExecutionContext:
         """Remove a component from the participants.
 
         Args:
-            component: the component.
+            component: component to remove.
 
         Returns:
-            BAD_PARAMETER if it does not take part, PRECONDITION_NOT_MET while it is Active.
+            BAD_PARAMETER if the component does not take part, or PRECONDITION_NOT_MET while it is
+            Active. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is None:
@@ -658,13 +674,13 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def release_component(self, component: RtComponent) -> ReturnCode:
-        """Remove a component from the participants; if it is Active, call on_deactivated at once.
+        """Remove a component from the participants. If it is Active, call on_deactivated at once.
 
         Args:
-            component: the component.
+            component: component to remove.
 
         Returns:
-            BAD_PARAMETER if it does not take part.
+            BAD_PARAMETER if the component does not take part. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is None:
@@ -676,11 +692,11 @@ class ExecutionContext:
         """Request the move from Inactive to Active.
 
         Args:
-            component: the component.
+            component: component to activate.
 
         Returns:
-            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
-            unless it is Inactive.
+            BAD_PARAMETER if the component does not take part or is not alive, or
+            PRECONDITION_NOT_MET unless it is Inactive. Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.INACTIVE, LifeCycleState.ACTIVE)
 
@@ -688,11 +704,11 @@ class ExecutionContext:
         """Request the move from Active to Inactive.
 
         Args:
-            component: the component.
+            component: component to deactivate.
 
         Returns:
-            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
-            unless it is Active and not on its way to Error.
+            BAD_PARAMETER if the component does not take part or is not alive, or
+            PRECONDITION_NOT_MET unless it is Active and not on its way to Error. Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.ACTIVE, LifeCycleState.INACTIVE)
 
@@ -700,25 +716,25 @@ class ExecutionContext:
         """Request the move from Error to Inactive.
 
         Args:
-            component: the component.
+            component: component to reset.
 
         Returns:
-            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
-            unless it is in Error.
+            BAD_PARAMETER if the component does not take part or is not alive, or
+            PRECONDITION_NOT_MET unless it is in Error. Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.ERROR, LifeCycleState.INACTIVE)
 
     def abort_component(self, component: RtComponent) -> ReturnCode:
         """Request the move from Inactive or Active to Error, for a proxy whose device failed.
 
-        OMG RTC has no such request: only a callback that fails leads to Error there.
+        OMG RTC has no such request. There, only a callback that fails leads to Error.
 
         Args:
-            component: the component.
+            component: component to abort.
 
         Returns:
-            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
-            if it is in Error.
+            BAD_PARAMETER if the component does not take part or is not alive, or
+            PRECONDITION_NOT_MET if it is in Error. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is None or not component.alive:
@@ -729,7 +745,7 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def state_of(self, component: RtComponent) -> LifeCycleState:
-        """Return the state of a component here; Created if it is not alive or takes no part."""
+        """Return the state of a component here, or Created if it is not alive or takes no part."""
         participant = self._find(component)
         if participant is None or not component.alive:
             return LifeCycleState.CREATED

@@ -15,10 +15,10 @@ from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 _LOW: Final = -(2**31)
 _HIGH: Final = 2**31 - 1
-"""What ConsoleIn takes."""
+"""Largest number that ConsoleIn accepts."""
 
 _LENGTH: Final = 10
-"""Elements of a sequence that SeqOut writes."""
+"""Number of elements of a sequence that SeqOut writes."""
 
 _COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
     "Octet": lambda n: n & 0xFF,
@@ -27,19 +27,19 @@ _COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
     "Float": lambda n: (n & 0x7FFF) / 4,
     "Double": lambda n: n / 4,
 }
-"""What SeqOut writes in period n, by the name of the port."""
+"""Values that SeqOut writes in period n, by the name of the port."""
 
 _SEQ_PORTS: Final[Mapping[str, Any]] = {
     name + seq: getattr(rtc, f"Timed{name}{seq}") for seq in ("", "Seq") for name in _COUNTED
 }
-"""Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
+"""Types of the ports of SeqIn and SeqOut by name, in the order of OpenRTM's SeqIn."""
 
 
 class ConsoleIn(RtComponent):
-    """Writes one number that was entered in each period.
+    """A component that writes one entered number in each period.
 
-    The component of OpenRTM waits for a number. This one does not block: the owner of the console
-    calls `enter`.
+    The component of OpenRTM waits for a number. This component does not block. Instead, the owner
+    of the console calls `enter`.
 
     Attributes:
         waiting: numbers that were entered and not yet written.
@@ -53,11 +53,11 @@ class ConsoleIn(RtComponent):
         self.waiting: deque[int] = deque()
 
     def enter(self, *numbers: int) -> None:
-        """Enter numbers, -2**31..2**31-1."""
+        """Enter numbers in the range -2**31..2**31-1."""
         self.waiting.extend(numbers)
 
     def typed(self, line: str) -> None:
-        """Enter a number as a person types it; ValueError if it is none, or out of range."""
+        """Enter a number as text. Raise ValueError if the text is not a number, or out of range."""
         try:
             number = int(line)
         except ValueError:
@@ -74,11 +74,11 @@ class ConsoleIn(RtComponent):
 
 
 class ConsoleOut(RtComponent):
-    """Displays each number that arrives.
+    """A component that displays each number that arrives.
 
     Attributes:
         received: all numbers that arrived, in order.
-        show: called with each value; the owner of the console prints it.
+        show: function that is called with each value. The owner of the console prints the value.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleOut", "Console output component")
@@ -90,7 +90,7 @@ class ConsoleOut(RtComponent):
         self.show: Callable[[TimedLong], None] | None = None
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Show what arrived."""
+        """Show the values that arrived."""
         while self.in_.is_new and (value := self.in_.read()) is not None:
             self.received.append(value)
             if self.show is not None:
@@ -99,11 +99,11 @@ class ConsoleOut(RtComponent):
 
 
 class SeqIn(RtComponent):
-    """Keeps the latest value of each of its ports; the component of OpenRTM displays the values.
+    """A component that keeps the latest value of each port. The OpenRTM component displays them.
 
     Attributes:
-        ins: its ports by name.
-        latest: the values by the name of their port.
+        ins: ports by name.
+        latest: latest values by the name of their port.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SeqIn", "Sequence InPort component")
@@ -114,7 +114,7 @@ class SeqIn(RtComponent):
         self.latest: dict[str, Struct] = {}
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take what arrived."""
+        """Read the values that arrived."""
         for name, port in self.ins.items():
             while port.is_new and (value := port.read()) is not None:
                 self.latest[name] = value
@@ -122,10 +122,10 @@ class SeqIn(RtComponent):
 
 
 class SeqOut(RtComponent):
-    """Writes a counted-up value to each of its ports in each period; those of OpenRTM are random.
+    """A component that writes counted values to its ports in each period. OpenRTM's are random.
 
     Attributes:
-        outs: its ports by name.
+        outs: ports by name.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SeqOut", "Sequence OutPort component")
@@ -156,7 +156,7 @@ class SeqOut(RtComponent):
 
 
 class ConfigSample(RtComponent):
-    """Has parameters, and does nothing with them; names and defaults are OpenRTM's."""
+    """A component with unused parameters. Their names and defaults are OpenRTM's."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConfigSample", "Configuration example component")
 

@@ -54,7 +54,7 @@ class Constraint:
     True
 
     Args:
-        text: the notation.
+        text: constraint in OpenRTM's notation.
 
     Raises:
         ValueError: the text has another notation.
@@ -65,7 +65,7 @@ class Constraint:
         self._checks = _parse(self.text)
 
     def allows(self, value: object) -> bool:
-        """Return whether a value, or each element of a tuple, is allowed."""
+        """Return whether a value is allowed. For a tuple, each element must be allowed."""
         values = value if isinstance(value, tuple) else (value,)
         checks = self._checks
         if len(checks) == 1:
@@ -80,17 +80,18 @@ class Constraint:
 
 
 class Parameter(Generic[V]):
-    """A parameter; its type is that of its default.
+    """A parameter of a component. The type of the default is the type of the parameter.
 
     Args:
-        name: in the configuration sets.
-        default: bool, int, float, str or a tuple of one of these with at least one element.
-        constraint: the values that it may have.
-        unit: of the value, for people.
-        widget: how an editor shows it, such as `text` or `slider.10`.
+        name: name of the parameter in the configuration sets.
+        default: default value, which is a bool, int, float, str or a tuple of one of these with at
+            least one element.
+        constraint: constraint that the values must meet.
+        unit: unit of the value, for display.
+        widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
 
     Attributes:
-        value: the present value; it changes only between callbacks of its component.
+        value: present value. It changes only between callbacks of the component.
 
     Raises:
         ValueError: the constraint does not allow the default, or its notation is unknown.
@@ -125,12 +126,12 @@ class Parameter(Generic[V]):
 
     @property
     def text(self) -> str:
-        """The default as a configuration set holds it."""
+        """The default as text in a configuration set."""
         return as_text(self.default)
 
 
 def as_text(value: object) -> str:
-    """Write a value as a configuration set holds it; elements of a tuple with commas between."""
+    """Return a value as text in a configuration set. Commas separate the elements of a tuple."""
     if isinstance(value, tuple):
         return ",".join(as_text(element) for element in value)
     return str(value).lower() if isinstance(value, bool) else str(value)
@@ -192,15 +193,16 @@ DEFAULT: Final = "default"
 
 
 class Configuration:
-    """Sets of parameter values, one of them active.
+    """The sets of parameter values, of which one set is active.
 
-    A change is checked at once. It takes effect before the callbacks of the component's next
-    period, at `initialize`, or when `update` is called.
+    A change is checked at once. The change takes effect before the callbacks of the component's
+    next period, at `initialize`, or when `update` is called.
 
     Attributes:
-        active_id: the set whose values apply, or will apply after the next update.
+        active_id: ID of the set whose values apply, or will apply after the next update.
         changed: whether there are changes for the next update.
-        on_update: called with the ID of the active set after its values took effect.
+        on_update: function that is called with the ID of the active set after its values took
+            effect.
     """
 
     def __init__(self) -> None:
@@ -216,23 +218,24 @@ class Configuration:
 
     @property
     def sets(self) -> Mapping[str, Mapping[str, str]]:
-        """The values of each set as text, by its ID."""
+        """The values of each set as text, by the ID of the set."""
         return MappingProxyType(self._sets)
 
     def bind(
         self, name: str, default: V, constraint: str = "", *, unit: str = "", widget: str = ""
     ) -> Parameter[V]:
-        """Add a parameter, with its default in the set `default`.
+        """Add a parameter. The set `default` gets its default value.
 
         Args:
-            name: in the configuration sets.
-            default: bool, int, float, str or a tuple of one of these; the type of the values.
-            constraint: the values that it may have, such as `0<=x<=10` (`Constraint`).
-            unit: of the value, for people.
-            widget: how an editor shows it, such as `text` or `slider.10`.
+            name: name of the parameter in the configuration sets.
+            default: default value, which is a bool, int, float, str or a tuple of one of these. Its
+                type is the type of the values.
+            constraint: constraint that the values must meet, such as `0<=x<=10` (`Constraint`).
+            unit: unit of the value, for display.
+            widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
 
         Returns:
-            The parameter; its `value` is the present value.
+            The parameter. Its attribute `value` is the present value.
 
         Raises:
             ValueError: the constraint does not allow the default, or is not a constraint.
@@ -243,7 +246,7 @@ class Configuration:
         return parameter
 
     def set(self, name: str, text: str, set_id: str = "") -> None:
-        """Change a value in a set; without a name, in the active set.
+        """Change a value in a set, or in the active set if no set is named.
 
         Raises:
             RtcRefused: the set or parameter is unknown, or the value is not allowed.
@@ -254,7 +257,7 @@ class Configuration:
         self.changed = True
 
     def add_set(self, set_id: str, values: Mapping[str, str]) -> None:
-        """Add or replace a set; a parameter that `values` leaves out has its default in the set.
+        """Add or replace a set. A parameter that `values` leaves out has its default in the set.
 
         Raises:
             RtcRefused: a parameter is unknown, or a value is not allowed.
@@ -265,14 +268,17 @@ class Configuration:
         self.changed = True
 
     def remove_set(self, set_id: str) -> None:
-        """Remove a set; RtcRefused if it is unknown, the default set or the active set."""
+        """Remove a set.
+
+        Raise RtcRefused if the set is unknown, the default set or the active set.
+        """
         self._set(set_id)
         if set_id in (DEFAULT, self.active_id):
             raise RtcRefused(f"configuration set {set_id!r} is in use")
         del self._sets[set_id]
 
     def activate(self, set_id: str) -> None:
-        """Make a set active from the next update on; RtcRefused if it is unknown."""
+        """Make a set active from the next update on. Raise RtcRefused if the set is unknown."""
         self._set(set_id)
         self.active_id, self.changed = set_id, True
 

@@ -1,4 +1,4 @@
-"""Base of components that talk with a device while they are Active."""
+"""The base class of components that communicate with a device while they are Active."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LOG: Final = log_of(__name__)
 
 
 class _DeviceClient(Protocol):
-    """What talks with a device."""
+    """A client that communicates with a device."""
 
     def close(self) -> None:
         """Release the line."""
@@ -24,13 +24,13 @@ C = TypeVar("C", bound=_DeviceClient)
 
 
 class DeviceComponent(RtComponent, ABC, Generic[C]):
-    """Opens a client when it is activated, and closes it when it is deactivated.
+    """A component that opens a client when it is activated, and closes it when it is deactivated.
 
-    If the line fails or the device refuses, it logs why, closes the client and goes into Error; the
-    next activation opens a new one.
+    If the line fails or the device refuses, the component logs the reason, closes the client and
+    goes to Error. The next activation opens a new client.
 
     Attributes:
-        client: communicates with the device while the component is Active.
+        client: client that communicates with the device while the component is Active.
     """
 
     def __init__(self, instance_name: str) -> None:
@@ -39,14 +39,17 @@ class DeviceComponent(RtComponent, ABC, Generic[C]):
 
     @abstractmethod
     def open_client(self) -> C:
-        """Return a new client; LinkError if the device cannot be reached."""
+        """Return a new client. Raise LinkError if the device cannot be reached."""
 
     @abstractmethod
     def exchange(self, ec: ExecutionContext, client: C) -> None:
-        """Talk with the device in a period; LinkError or DeviceRefused if that fails."""
+        """Communicate with the device in a period.
+
+        Raise LinkError or DeviceRefused if that fails.
+        """
 
     def release(self, ec: ExecutionContext) -> None:
-        """Do what is left to do before the client is closed; nothing unless overridden."""
+        """Do final work before the client is closed. The default implementation does nothing."""
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Open the client, also after Error."""
@@ -62,7 +65,7 @@ class DeviceComponent(RtComponent, ABC, Generic[C]):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Talk with the device."""
+        """Communicate with the device."""
         if self.client is None:
             return ReturnCode.RTC_ERROR
         try:

@@ -1,4 +1,4 @@
-"""Lists of functions that are called when something happens; none of them can stop the rest."""
+"""Lists of functions that are called when something happens. No function can stop the others."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _LOG: Final = log_of(__name__)
 def call_listeners(
     who: str, listeners: Iterable[Callable[P, object]], *args: P.args, **kwargs: P.kwargs
 ) -> None:
-    """Call each listener; an exception in one is logged and has no other effect.
+    """Call each listener. An exception in a listener is logged and has no other effect.
 
     Args:
-        who: owner of the listeners, for messages.
-        listeners: called in their order; a listener may add or remove listeners.
+        who: owner of the listeners, used in messages.
+        listeners: functions that are called in their order. A listener may add or remove listeners.
         args: positional arguments of each call.
         kwargs: keyword arguments of each call.
     """

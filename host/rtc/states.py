@@ -1,4 +1,4 @@
-"""Codes and states of OMG RTC 1.0 with the numbers of its IDL, and what refuses with them."""
+"""Codes and states of OMG RTC 1.0 with the numbers of its IDL, and the error with such a code."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from typing import Final
 
 MAX_RATE_HZ: Final = 1_000_000
 MIN_RATE_HZ: Final = 1e-6
-"""Of execution contexts and of periodic connectors; the latter is one period in eleven days."""
+"""Minimum rate of execution contexts and of periodic connectors.
+
+The minimum for connectors is one period in eleven days.
+"""
 
 
 class ReturnCode(IntEnum):
@@ -40,7 +43,7 @@ class LifeCycleState(IntEnum):
 
 
 class ExecutionKind(IntEnum):
-    """What an execution context runs its components on (ExecutionKind)."""
+    """Kind of an execution context (ExecutionKind)."""
 
     PERIODIC = 0
     EVENT_DRIVEN = 1
@@ -51,7 +54,7 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
     """An operation on components, ports or connectors is not possible.
 
     Attributes:
-        code: the return code of OMG RTC for this case.
+        code: return code of OMG RTC for the refusal.
     """
 
     def __init__(self, message: str, code: ReturnCode = ReturnCode.BAD_PARAMETER) -> None:
@@ -62,7 +65,7 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
 class PortStatus(IntEnum):
     """Result of a write (OpenRTM-aist 1.x, DataPortStatus), without codes that never occur here.
 
-    Only ports that are joined with those of peers give PORT_ERROR, BUFFER_EMPTY and
+    Only ports that are connected with ports of peers give PORT_ERROR, BUFFER_EMPTY and
     CONNECTION_LOST.
     """
 

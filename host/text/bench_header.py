@@ -26,7 +26,7 @@ class WireType(StrEnum):
 
 
 class Place(StrEnum):
-    """Place of the recording: at the devices, tick by tick, or at the host's port."""
+    """Place of the recording, at the devices, tick by tick, or at the host's port."""
 
     DEVICE = "device"
     PORT = "port"
@@ -37,8 +37,8 @@ class WireEntry:
     """A wire of a bench.
 
     Attributes:
-        type: kind of traffic.
-        config: its settings, such as the bit rate.
+        type: kind of traffic on the wire.
+        config: settings of the wire, such as the bit rate.
     """
 
     type: WireType
@@ -51,8 +51,8 @@ class DeviceEntry:
 
     Attributes:
         wire: name of the wire of the device.
-        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if a program
-            made the device, which then cannot be rebuilt.
+        type: device type, model, EDS or DCF file, or `FILE.py:Class`. It is empty if a program made
+            the device, which then cannot be rebuilt.
         config: settings of the device.
         node_id: node-ID of a CANopen node.
         sha256: SHA-256 of the file in `type`.
@@ -71,16 +71,16 @@ class DeviceEntry:
 
 @dataclass(frozen=True, slots=True)
 class BenchHeader:
-    """The first line: the devices of the bench.
+    """The first line of a trace, with the devices of the bench.
 
     Attributes:
-        devices: the devices by name.
-        wires: the wires by name.
+        devices: devices by name.
+        wires: wires by name.
         seed: seed of all random numbers.
-        place: where the recording was made.
+        place: place of the recording.
 
     Raises:
-        ValueError: an invalid name, or an unknown wire.
+        ValueError: a name is invalid, or a wire is unknown.
     """
 
     devices: Mapping[str, DeviceEntry]
@@ -100,11 +100,11 @@ class BenchHeader:
                 )
 
     def on_can(self, name: str) -> bool:
-        """Return whether a device hears frames, not bytes."""
+        """Return whether a device receives frames, and not bytes."""
         return self.wires[self.devices[name].wire].type is WireType.CAN
 
     def encode(self) -> str:
-        """Write the first line, without LF."""
+        """Return the first line without LF."""
         header: dict[str, object] = {"seed": self.seed}
         if self.place is not Place.DEVICE:
             header["place"] = self.place
@@ -123,7 +123,7 @@ def _written(device: DeviceEntry) -> dict[str, object]:
 
 
 def parse_bench_header(line: str) -> BenchHeader:
-    """Read the first line; TraceError if it is not a valid header."""
+    """Read the first line. Raise TraceError if it is not a valid header."""
     if not line.startswith(PREFIX):
         raise TraceError(f"line 1 is not '{PREFIX}{{HEADER}}': {line!r:.60}")
     try:
@@ -164,7 +164,7 @@ def _wire(name: str, table: object) -> WireEntry:
 
 
 class _Reader:
-    """Reads values of a JSON object from an untrusted source."""
+    """A reader of values in a JSON object from an untrusted source."""
 
     def __init__(self, values: object, owner: str) -> None:
         if not isinstance(values, dict):
@@ -172,7 +172,7 @@ class _Reader:
         self.values, self._owner = values, owner
 
     def take(self, name: str, expected: type, *default: Any) -> Any:
-        """Return a value of a type, or the default; ValueError without both."""
+        """Return a value of a type, or the default. Raise ValueError without both."""
         value = self.values.get(name, *default)
         if type(value) is not expected and not (default and value == default[0]):
             raise ValueError(f"{self._owner} has no {name}, or a bad one: {value!r:.60}")

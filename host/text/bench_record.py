@@ -9,7 +9,7 @@ r"""The text format of bench recordings: version 2 of traces.
     0.512000 left ! bus_state error-passive
     2.000000 .
 
-Each line has a time in seconds, the name of a device or wire, a mark and a text. The marks:
+Each line has a time in seconds, the name of a device or wire, a mark and a text. The marks are:
 
 - `>` is traffic to the device, `<` is traffic from the device. Bytes are written by
   `byte_text.escape`. Frames are written as candump does, one per line.
@@ -48,18 +48,18 @@ BUS_STATE: Final = {
         ("bus-off", ErrorState.BUS_OFF),
     )
 }
-"""Reports of a CAN controller to its device, as in a line."""
+"""Reports of a CAN controller to its device, by their text in a line."""
 
 
 class BenchRecord(NamedTuple):
     """One line of a trace.
 
     Attributes:
-        at_us: the tick, or the time at the host's port.
-        name: name of the device; for `~`, the name of the wire.
-        mark: the mark, which is the kind of the line.
-        traffic: the traffic of `>` and `<`.
-        text: the text of `!` and `~`.
+        at_us: time of the tick, or time at the host's port.
+        name: name of the device, or for `~` the name of the wire.
+        mark: mark that is the kind of the line.
+        traffic: traffic of `>` and `<`.
+        text: text of `!` and `~`.
         line: number of the line in its file, from 1.
     """
 
@@ -71,26 +71,26 @@ class BenchRecord(NamedTuple):
     line: int = 0
 
     def encode(self) -> str:
-        """Write the line, without LF."""
+        """Return the line without LF."""
         if self.mark is Mark.END:
             return f"{format_time(self.at_us)} ."
         return f"{format_time(self.at_us)} {self.name} {self.mark} {self.written}"
 
     @property
     def written(self) -> str:
-        """What stands behind the mark."""
+        """Text after the mark."""
         traffic = self.traffic
         return self.text or (escape(traffic) if isinstance(traffic, bytes) else str(traffic))
 
     @property
     def change(self) -> tuple[str, Setting] | None:
-        """The changed input and its value, for `!`; None for a reset and controller reports."""
+        """The changed input and its value for `!`, or None for a reset and controller reports."""
         name, equals, value = self.text.partition("=")
         return (name, json.loads(value)) if equals else None
 
 
 def change_text(name: str, value: Setting) -> str:
-    """Return the text of a set input, for `!`.
+    """Return the text of a set input for `!`.
 
     >>> change_text("0x1008", "a b"), change_text("load_nm", 0.5)
     ('0x1008="a b"', 'load_nm=0.5')
@@ -99,10 +99,10 @@ def change_text(name: str, value: Setting) -> str:
 
 
 class BenchParser:
-    """Reads the lines after a header.
+    """A parser for the lines after a header.
 
     Args:
-        header: the header, which has the names and wires.
+        header: header with the names and wires.
     """
 
     def __init__(self, header: BenchHeader) -> None:
@@ -111,10 +111,10 @@ class BenchParser:
         self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
-        """Read line by line; times must not decrease, and no line may follow the end.
+        """Read line by line. Times must not decrease, and no line may follow the end.
 
         Raises:
-            TraceError: a damaged line.
+            TraceError: a line is damaged.
         """
         made, known, before_us, ended = tuple.__new__, self._known, 0, False
         for number, line in enumerate(lines, 2):

@@ -21,7 +21,10 @@ _TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
-    """Write bytes as printable ASCII; also escape blanks at both ends, to make them visible."""
+    """Return bytes as printable ASCII.
+
+    Blanks at both ends are also escaped, to make them visible.
+    """
     text = "".join(map(_TEXT.__getitem__, data))
     if text.endswith(" "):
         text = text[:-1] + r"\x20"
@@ -32,7 +35,7 @@ def unescape(text: str) -> bytes:
     r"""Read the text of `escape`.
 
     Raises:
-        ValueError: a character or an escape that `escape` never writes.
+        ValueError: the text has a character or an escape that `escape` never writes.
     """
     out, at = [], 0
     while at < len(text):

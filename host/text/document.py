@@ -1,4 +1,4 @@
-"""A user's text as a tree of values, each with its line.
+"""A user's text as a tree of values, each with its line number.
 
 >>> print(FileMistake(FilePlace("bus.yml", 7), "node_id: 200 is not in 1..127"))
 bus.yml:7: node_id: 200 is not in 1..127
@@ -15,7 +15,7 @@ Scalar = Key
 
 
 class FilePlace(NamedTuple):
-    """A line of a file; line 0 stands for the file as a whole. The file may have no name."""
+    """A line of a file. Line 0 stands for the file as a whole. The file may have no name."""
 
     file: str
     line: int
@@ -29,8 +29,8 @@ class FileMistake(NamedTuple):
     """One error in one of several files.
 
     Attributes:
-        place: its file and line.
-        text: the invalid value, and the allowed ones.
+        place: file and line of the error.
+        text: invalid value, and the allowed values.
         rule: name of the violated rule, empty if there is none.
     """
 
@@ -48,9 +48,9 @@ class Item:
     """A value of the file.
 
     Attributes:
-        value: the value of a scalar, the items of a list, or the items of a mapping by key.
+        value: value of a scalar, items of a list, or items of a mapping by key.
         place: file and line of the item.
-        text: a scalar as written in the file, shortened to one line.
+        text: text of a scalar in the file, shortened to one line.
         keys: places of the keys of a mapping.
     """
 
@@ -61,31 +61,31 @@ class Item:
 
     @property
     def fields(self) -> Mapping[Key, Item]:
-        """The items of a mapping; empty for other values."""
+        """The items of a mapping, empty for other values."""
         return self.value if isinstance(self.value, dict) else {}
 
     @property
     def items(self) -> tuple[Item, ...]:
-        """The items of a list; empty for other values."""
+        """The items of a list, empty for other values."""
         return self.value if isinstance(self.value, tuple) else ()
 
     @property
     def plain(self) -> Any:
-        """Its plain values, in lists and dictionaries."""
+        """Plain values of the item, in lists and dictionaries."""
         return _plain(self, {})
 
     @property
     def is_list(self) -> bool:
-        """Whether it is a list."""
+        """Whether the item is a list."""
         return isinstance(self.value, tuple)
 
     @property
     def is_mapping(self) -> bool:
-        """Whether it is a mapping."""
+        """Whether the item is a mapping."""
         return isinstance(self.value, dict)
 
     def __str__(self) -> str:
-        """Return its text for a message."""
+        """Return the text of the item for a message."""
         if self.is_list:
             return "a list"
         return "a mapping" if self.is_mapping else repr(self.text) if self.text else "nothing"

@@ -24,10 +24,10 @@ class PageTemplate:
     """The template of a page, in the folder `template` of a package.
 
     Args:
-        package: the package.
+        package: name of the package.
         names: filters and globals of the template, besides the common ones.
-        script: the file of its script, empty for none.
-        page: the file of the template.
+        script: file of the page's script, empty for none.
+        page: file of the template.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class PageTemplate:
         self._template = environment.get_template(page)
 
     def render(self, **values: Any) -> str:
-        """Return the page for these values; equal values always give the same bytes."""
+        """Return the page for these values. Equal values always give the same bytes."""
         policy = page_text.content_policy(self._style, self._script)
         return self._template.render(
             style=Markup(self._style), script=Markup(self._script), policy=policy, **values

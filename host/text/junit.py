@@ -30,12 +30,13 @@ class JunitCase:
     """A test case.
 
     Attributes:
-        group: its group, the `classname`.
-        name: of the case.
-        tag: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`; empty if the case passed.
-        message: the reason in one line; an `OUTPUT` has none.
-        text: the details.
-        duration_us: duration, None if unknown.
+        group: group of the case, which is its `classname`.
+        name: name of the case.
+        tag: tag of the case: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`, or empty if the case
+            passed.
+        message: reason in one line. An `OUTPUT` has none.
+        text: details of the case.
+        duration_us: duration of the case, or None if unknown.
     """
 
     group: str
@@ -48,12 +49,12 @@ class JunitCase:
 
 @dataclass(frozen=True, slots=True)
 class JunitSuite:
-    """A suite.
+    """A suite of test cases.
 
     Attributes:
-        name: of the suite.
-        cases: in the order of the report.
-        properties: tested object and settings, by name.
+        name: name of the suite.
+        cases: cases in the order of the report.
+        properties: properties of the tested object, and settings, by name.
     """
 
     name: str
@@ -62,11 +63,11 @@ class JunitSuite:
 
 
 def junit_text(suites: Iterable[JunitSuite], name: str = "") -> str:
-    """Return the report.
+    """Return the report as JUnit XML.
 
     Args:
-        suites: in their order.
-        name: of the whole report, empty for none.
+        suites: suites in their order.
+        name: name of the whole report, empty for none.
     """
     root = Element("testsuites", {"name": harmless(name)} if name else {})
     for suite in suites:

@@ -1,4 +1,4 @@
-"""The loggers of the library, silent unless the program configures logging."""
+"""The loggers of the library, which are silent unless the program configures logging."""
 
 from __future__ import annotations
 

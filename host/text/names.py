@@ -9,12 +9,12 @@ from typing import Final
 _MOST: Final = 40
 SHOWN: Final = 8
 _LONGEST: Final = 200
-"""Longest name for suggestions."""
+"""Length of the longest name for suggestions."""
 _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
 def known(names: Iterable[str]) -> str:
-    """List the names, or the first ones and their number.
+    """List the names, or the first names and the number of names.
 
     >>> known(["stick", "lamp"])
     'stick, lamp'
@@ -41,7 +41,7 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the probable name, ignoring case; the list is empty if no name is similar.
+    """Return the probable name, ignoring case. The list is empty if no name is similar.
 
     A name that differs only in its numbers is another name, not a misspelling.
 

@@ -1,4 +1,4 @@
-"""Tables and listings as HTML for Jupyter, in which markup in foreign text has no effect.
+"""Tables and listings as HTML for Jupyter. Markup in texts of others has no effect.
 
 A notebook inserts the result of `_repr_html_` into its own page, which does not have the style
 sheet and the content security policy of tickrig. Therefore every text is escaped, and invisible
@@ -35,7 +35,7 @@ def text(value: object) -> str:
 
 
 def heading(title: str, *facts: object) -> str:
-    """Return a title, and facts beside it."""
+    """Return a title with facts beside it."""
     return f"<p><b>{text(title)}</b> {text(' · '.join(map(str, facts)))}</p>"
 
 
@@ -47,14 +47,14 @@ def table(
     opened: bool = False,
     most: int = 200,
 ) -> str:
-    """Return a table; empty if there are no rows.
+    """Return a table, empty if there are no rows.
 
     Args:
-        columns: the titles of the columns.
-        rows: the cells.
-        title: the title of a table that can be folded.
+        columns: titles of the columns.
+        rows: cells of the rows.
+        title: title of a table that can be folded.
         opened: whether a table that can be folded is unfolded at first.
-        most: number of rows that are shown; a line below gives the number of the other rows.
+        most: number of rows that are shown. A line below gives the number of the other rows.
     """
     every = iter(rows)
     shown = list(islice(every, most))

@@ -1,4 +1,4 @@
-r"""Times, sizes and foreign texts for pages, terminals and JSON.
+r"""Times, sizes and texts of others for pages, terminals and JSON.
 
 >>> duration(3_100), duration(2_000_000), duration(200_000_000)
 ('3.1 ms', '2.00 s', '3 min 20 s')
@@ -33,7 +33,7 @@ def harmless(value: Any) -> Any:  # a template prints values of any type
 
 
 def one_line(value: str) -> str:
-    r"""Return such a text in one line.
+    r"""Return a harmless text in one line.
 
     >>> one_line("a\nFAIL b")
     'a␊FAIL b'
@@ -58,9 +58,9 @@ def json_text(value: object, *, compact: bool = False, letters: bool = False) ->
     r"""Return a value as JSON in one line, with escaped control characters.
 
     Args:
-        value: a value for `json.dumps`.
-        compact: without blanks.
-        letters: write letters beyond ASCII unescaped.
+        value: value for `json.dumps`.
+        compact: whether to omit blanks.
+        letters: whether to write letters beyond ASCII unescaped.
 
     >>> json_text("µ\x1b\x7f\x9b\u202e", letters=True), json_text("µ\x7f")
     ('"µ\\u001b\\u007f\\u009b\\u202e"', '"\\u00b5\\u007f"')
@@ -92,7 +92,7 @@ def _shown(match: re.Match[str]) -> str:
 
 
 def duration(us: int | None) -> str:
-    """Write a duration."""
+    """Return a duration as text."""
     match us:
         case None:
             return DASH
@@ -108,7 +108,7 @@ def duration(us: int | None) -> str:
 
 
 def seconds(us: int) -> str:
-    """Write a time in seconds, without trailing zeros.
+    """Return a time in seconds as text, without trailing zeros.
 
     >>> seconds(630_000), seconds(2_000_000)
     ('0.63', '2')
@@ -117,7 +117,7 @@ def seconds(us: int) -> str:
 
 
 def size(characters: int) -> str:
-    """Write the length of a text.
+    """Return the length of a text as text.
 
     >>> size(999), size(3_600), size(1_100_000)
     ('999 bytes', '3.6 kB', '1.1 MB')

@@ -1,4 +1,4 @@
-"""A table of a user's file while the file is read: the fields of the table and their errors.
+"""A table of a user's file while the file is read, with its fields and their errors.
 
 A taker converts a value of the file, or raises ValueError with the allowed values.
 
@@ -49,13 +49,13 @@ from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPat
 from tickrig.host.text.values import counted, parse_size, us_of
 
 _Taker = Callable[[Any], Any]
-"""Converts a TOML value; ValueError with the allowed values."""
+"""Function that converts a TOML value, or raises ValueError with the allowed values."""
 
 _LONGEST: Final = 60
 
 
 def shown(value: object) -> str:
-    """Write a value in one short line.
+    """Return a value in one short line.
 
     >>> shown(True), shown({"a": 1}), shown("x")
     ('true', 'a table', "'x'")
@@ -74,7 +74,7 @@ def shown(value: object) -> str:
 
 
 def anything(value: Any) -> Any:
-    """Accept any value, because `Section.sub` or `Section.tables` reads it."""
+    """Accept any value, because `Section.sub` or `Section.tables` reads the value."""
     return value
 
 
@@ -93,7 +93,7 @@ def string(value: object) -> str:
 
 
 def matching(accepts: Callable[[str], object], what: str) -> _Taker:
-    """Return a taker for texts that a function accepts; `what` describes them in messages."""
+    """Return a taker for texts that a function accepts. `what` describes them in messages."""
 
     def take(value: object) -> str:
         if isinstance(value, str) and accepts(value):
@@ -153,7 +153,7 @@ def lines(value: object) -> dict[str, str]:
 
 
 def whole(low: int, high: int) -> _Taker:
-    """Return a taker for whole numbers of a range."""
+    """Return a taker for whole numbers in a range."""
 
     def take(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
@@ -164,7 +164,7 @@ def whole(low: int, high: int) -> _Taker:
 
 
 def number(low: float, high: float, *, above: bool = False) -> _Taker:
-    """Return a taker for numbers of a range; `above` excludes its lower end."""
+    """Return a taker for numbers in a range. `above` excludes the lower end of the range."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
     def take(value: object) -> float:
@@ -191,7 +191,7 @@ def one_of(*names: str) -> _Taker:
 
 
 def duration(value: object) -> int:
-    """Accept a time as text, at least 1 us; return microseconds."""
+    """Accept a time as text, at least 1 us. Return microseconds."""
     if isinstance(value, str) and (duration_us := us_of(value)):
         return duration_us
     raise ValueError(f'it takes a time as "500ms", above 0, not {shown(value)}')
@@ -207,7 +207,7 @@ def size(value: object) -> int:
 
 
 _MOST: Final = 500
-"""Largest number of characters of an error."""
+"""Maximum number of characters of an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,10 +215,10 @@ class Field:
     """A key of a table.
 
     Attributes:
-        field: converts its value.
-        values: allowed values, for people.
-        text: description, for people.
-        default: default value, for people; empty if the key is required.
+        field: function that converts the value of the field.
+        values: allowed values as text for the user.
+        text: description as text for the user.
+        default: default value as text for the user, empty if the key is required.
     """
 
     field: _Taker
@@ -228,11 +228,11 @@ class Field:
 
 
 Schema = Mapping[str, Field]
-"""The keys of a table."""
+"""Fields of a table by key."""
 
 
 def rows(schema: Schema) -> Iterator[str]:
-    """Yield the lines of a schema's table for the page."""
+    """Yield the lines of a schema's table for the documentation page."""
     yield "| key | value | unless given | meaning |"
     yield "|---|---|---|---|"
     for name, key in schema.items():
@@ -244,9 +244,9 @@ class Notes:
     """The errors of a document.
 
     Attributes:
-        document: the document.
-        mistakes: the errors found until now.
-        names: other names that values have in the file; empty for a rig file.
+        document: document with the errors.
+        mistakes: errors found until now.
+        names: other names that values have in the file, empty for a rig file.
     """
 
     document: TomlDocument
@@ -259,7 +259,7 @@ class Notes:
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return the start of an error message: the keys as they are written in the file."""
+        """Return the start of an error message, which contains the keys as written in the file."""
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
@@ -271,12 +271,12 @@ class Notes:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A table.
+    """A table of the document.
 
     Attributes:
-        notes: the errors of the whole document.
-        keys: the keys that lead to this table, from the top.
-        values: the values in the table.
+        notes: errors of the whole document.
+        keys: keys that lead to the table, from the top.
+        values: values in the table.
     """
 
     notes: Notes
@@ -284,7 +284,7 @@ class Section:
     values: dict[str, Any]
 
     def wrong(self, reason: str, *keys: str | int) -> None:
-        """Add an error for the table, or for the value at keys in it."""
+        """Add an error for the table, or for the value at keys in the table."""
         self.notes.wrong((*self.keys, *keys), reason)
 
     def unknown(self, reason: str, *keys: str | int) -> None:
@@ -293,11 +293,11 @@ class Section:
             self.wrong(reason, *keys)
 
     def read(self, schema: Schema, *others: str) -> dict[str, Any]:
-        """Read the values of a schema; report and omit invalid ones.
+        """Read the values of a schema. Report and omit invalid values.
 
         Args:
-            schema: the keys.
-            others: keys read elsewhere.
+            schema: fields by key.
+            others: keys that are read elsewhere.
         """
         found: dict[str, Any] = {}
         for key, value in self.values.items():
@@ -317,13 +317,13 @@ class Section:
         return found
 
     def no_key(self, key: str, known: Iterable[str]) -> None:
-        """Add an error for an unknown key, in its own line."""
+        """Add an error for an unknown key, in the line of the key."""
         line = self.notes.document.line_of((*self.keys, key))
         reason = f"no key {key!r}; {near(key, list(dict.fromkeys(known)))}"
         self.notes.mistakes.append(Mistake(line, f"{self.notes.place(self.keys)}{reason}"))
 
     def sub(self, key: str) -> Section | None:
-        """Return the table of a key; None if the key is missing.
+        """Return the table of a key, or None if the key is missing.
 
         If the value is not a table, report the error and return None.
         """
@@ -336,7 +336,7 @@ class Section:
         return None
 
     def tables(self, key: str) -> list[Section]:
-        """Return the tables `[[key]]`; report other values."""
+        """Return the tables `[[key]]`. Report other values."""
         value = self.values.get(key, [])
         if value is BROKEN:
             return []
@@ -362,13 +362,13 @@ class Section:
 
 
 def read_section(text: str) -> Section:
-    """Read a TOML text; its mistakes are in `notes`."""
+    """Read a TOML text. Its mistakes are in `notes`."""
     document = read_toml(text)
     return Section(Notes(document), (), document.values)
 
 
 def in_a_line(mistakes: Sequence[Mistake]) -> str:
-    """Write the first error, and the number of others.
+    """Return the first error, and the number of other errors, as text.
 
     >>> in_a_line([Mistake(3, "no key 'a'"), Mistake(4, "no key 'b'")])
     "line 3: no key 'a' (and 1 mistake more)"
@@ -379,7 +379,7 @@ def in_a_line(mistakes: Sequence[Mistake]) -> str:
 
 
 def is_broken(value: object) -> bool:
-    """Return whether a value, or a part of it, is invalid TOML, already reported."""
+    """Return whether a value, or a part of the value, is invalid TOML that is already reported."""
     match value:
         case dict():
             return any(map(is_broken, value.values()))
@@ -400,7 +400,7 @@ def _printable(text: str) -> str:
 
 
 def _dotted(keys: TomlPath) -> str:
-    """Write keys as TOML does; indices count from 1.
+    """Return keys in the notation of TOML. Indices count from 1.
 
     >>> _dotted(("device", "left", "start", "0x6000:1", 0))
     'device.left.start."0x6000:1"[1]'

@@ -1,9 +1,9 @@
-"""Steps of scenarios and sequences: time, action, expectations, repetition.
+"""Steps of scenarios and sequences, with time, action, expectations and repetition.
 
 Scenarios and sequences share this model, but have different syntaxes:
 
 - A scenario consists of lines with times from the start (docs/reference/bench/scenario.md).
-- A sequence is TOML or consists of lines; each step follows the previous one
+- A sequence is TOML or consists of lines. Each step follows the previous one
   (docs/reference/canmon/canmon-sending.md).
 """
 
@@ -27,12 +27,12 @@ _COMMENT: Final = re.compile(r"(^|\s)#.*")
 
 
 class StepError(ValueError):
-    """Invalid steps: `FILE:LINE: the value, and what is allowed`."""
+    """Invalid steps. The message is `FILE:LINE: the value, and what is allowed`."""
 
 
 @dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
 class Condition(Generic[_Came]):
-    """An expectation: its text, and its condition."""
+    """An expectation with its text and its condition."""
 
     text: str
     matches: Callable[[_Came], bool]
@@ -40,19 +40,20 @@ class Condition(Generic[_Came]):
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Generic[_What, _Came]):
-    """One step; its parts run in the order of the attributes, and most steps have only one part.
+    """One step. Its parts run in the order of the attributes, and most steps have only one part.
 
     Attributes:
         place: place of the step in its file.
-        at_us: time in microseconds, after the previous step was due; in a scenario after its start.
-        what: the action; None for no action.
-        wanted: expectations, in any order; the first match of an expectation meets it.
+        at_us: time in microseconds after the previous step was due, or in a scenario after its
+            start.
+        what: action of the step, or None for no action.
+        wanted: expectations in any order. The first match of an expectation meets it.
         within_us: time limit for the expectations, from `at_us`.
-        goes_on: whether to continue after a missed expectation; otherwise the steps end.
+        goes_on: whether to continue after a missed expectation. Otherwise the steps end.
         on_fail: steps that run first after a missed expectation.
-        times: number of repetitions of `steps`; `FOREVER` repeats them until stopped; None for no
-            repetition.
-        steps: the repeated steps.
+        times: number of repetitions of `steps`, or None for no repetition. `FOREVER` repeats the
+            steps until they are stopped.
+        steps: steps that are repeated.
     """
 
     place: Place
@@ -67,12 +68,12 @@ class Step(Generic[_What, _Came]):
 
     @property
     def takes_time(self) -> bool:
-        """Whether it waits for anything, so that endless repetition is allowed."""
+        """Whether the step waits for anything, so that endless repetition is allowed."""
         return bool(self.at_us or self.wanted) or any(step.takes_time for step in self.steps)
 
 
 def content_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Yield each line that says something, without its comment (`#`), and its number from 1."""
+    """Yield each non-empty line without its comment (`#`), and its number from 1."""
     for number, line in enumerate(text.splitlines(), 1):
         if content := _COMMENT.sub("", line).strip():
             yield number, content

@@ -34,11 +34,11 @@ BROKEN: Final = _Broken.BROKEN
 
 
 class Mistake(NamedTuple):
-    """One error.
+    """One error in a text.
 
     Attributes:
-        line: from 1.
-        reason: for people.
+        line: number of the line, from 1.
+        reason: reason as text for the user.
     """
 
     line: int
@@ -53,10 +53,10 @@ class TomlDocument:
     """The result of reading a text.
 
     Attributes:
-        values: its values, `BROKEN` in place of invalid ones.
-        lines: by path, the line of a value, or of the header of a table.
+        values: values of the text, with `BROKEN` in place of invalid values.
+        lines: line of each value, or of the header of a table, by path.
         mistakes: errors in the order of their lines.
-        whole: whether all headers were read; if not, tables may be missing.
+        whole: whether all headers were read. If not, tables may be missing.
     """
 
     values: dict[str, Any]
@@ -65,7 +65,7 @@ class TomlDocument:
     whole: bool = True
 
     def line_of(self, path: Sequence[str | int]) -> int:
-        """Return the line of a value, or of the nearest enclosing one.
+        """Return the line of a value, or of the nearest enclosing value.
 
         Args:
             path: keys and indices from the top.
@@ -78,7 +78,7 @@ class TomlDocument:
 
 @dataclass(slots=True, eq=False)
 class _Leaf:
-    """A scalar."""
+    """A scalar value."""
 
     line: int
     value: Any
@@ -86,7 +86,7 @@ class _Leaf:
 
 @dataclass(slots=True, eq=False)
 class _Array:
-    """An array; `frozen` unless it is an array of tables with headers `[[...]]`."""
+    """An array. It is `frozen` unless it is an array of tables with headers `[[...]]`."""
 
     line: int
     items: list[_Node] = field(default_factory=list)
@@ -97,8 +97,8 @@ class _Array:
 class _Table:
     """A table.
 
-    If it is `closed`, it accepts no second header and no dotted keys. If it is `frozen`, it accepts
-    no additions.
+    If the table is `closed`, it accepts no second header and no dotted keys. If it is `frozen`, it
+    accepts no additions.
     """
 
     line: int
@@ -107,7 +107,7 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table of a key on the path of a header; of an array, return the last table.
+        """Return the table of a key on the path of a header. For an array, return the last table.
 
         Raises:
             _TakenError: the key has another value.
@@ -120,7 +120,7 @@ class _Table:
         return node
 
     def open(self, line: int, key: str) -> _Table:
-        """Return the table of a header `[key]`; _TakenError if it cannot have one."""
+        """Return the table of a header `[key]`. Raise _TakenError if there cannot be one."""
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:
             raise _TakenError(key, node.line)
@@ -128,7 +128,7 @@ class _Table:
         return node
 
     def add(self, line: int, key: str) -> _Table:
-        """Return a new table of a header `[[key]]`; _TakenError if it cannot have one."""
+        """Return a new table of a header `[[key]]`. Raise _TakenError if there cannot be one."""
         node = self.entries.setdefault(key, _Array(line, frozen=False))
         if not isinstance(node, _Array) or node.frozen:
             raise _TakenError(key, node.line)
@@ -136,7 +136,10 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table of the first part of a dotted key; _TakenError if there is none."""
+        """Return the table of the first part of a dotted key.
+
+        Raise _TakenError if there is none.
+        """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:
             raise _TakenError(key, node.line)
@@ -147,21 +150,21 @@ _Node = _Table | _Array | _Leaf
 
 
 class _TakenError(Exception):
-    """A key that is there already, in another way."""
+    """A key that exists already in another form."""
 
     def __init__(self, key: str, line: int) -> None:
         super().__init__(f"{key!r} stands in line {line} already")
 
 
 def _document_of(top: _Table, mistakes: Iterable[Mistake], *, whole: bool) -> TomlDocument:
-    """Return the document of its top table."""
+    """Return the document of the top table."""
     lines: dict[TomlPath, int] = {}
     values = {key: _plain(each, (key,), lines) for key, each in top.entries.items()}
     return TomlDocument(values, lines, tuple(sorted(dict.fromkeys(mistakes))), whole)
 
 
 def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
-    """Return the value of a node, and record the lines of it and its content."""
+    """Return the value of a node. Record the lines of the node and of its content."""
     lines[path] = node.line
     match node:
         case _Table():
@@ -172,7 +175,7 @@ def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
 
 
 _MOST_DEEP: Final = 50
-"""Largest depth of arrays and inline tables, and number of parts of a key."""
+"""Maximum depth of arrays and inline tables, and maximum number of parts of a key."""
 
 _MOST_MISTAKES: Final = 1_000
 """Number of errors after which reading stops."""
@@ -191,24 +194,24 @@ _LONG: Final = {
 }
 _PLAIN: Final = re.compile(r"[^\s,\[\]{}#\"']+(?: [0-9][^\s,\[\]{}#\"']*)?")
 _PARTS: Final = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{_MOST_DEEP}}}[\w\"'-]")
-"""A key that the standard library reads in quadratic time."""
+"""Pattern of a key part, because the standard library reads keys in quadratic time."""
 _WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,17}")
 _SIMPLE: Final = re.compile(r"\"[^\"\\]*\"|'[^']*'")
 _STATEMENT: Final = re.compile(
     r"[ \t]*+(?:\[\[?[ \t]*(?!(?:true|false|inf|nan)\b)[A-Za-z_][^\]\n]*\]\]?[ \t]*(?:#|\n|$)"
     r"|[\w.\"' \t-]+=)"
 )
-"""The probable start of a statement after an unfinished array."""
+"""Pattern of the probable start of a statement after an unfinished array."""
 
 
 def load_toml(text: str) -> dict[str, Any]:
     """Return the values of a text, read by the parser of the standard library.
 
     Args:
-        text: the whole.
+        text: whole text.
 
     Raises:
-        TOMLDecodeError: invalid TOML, or nested too deeply.
+        TOMLDecodeError: the text is invalid TOML, or is nested too deeply.
     """
     if found := _PARTS.search(text):
         line = text.count("\n", 0, found.start()) + 1
@@ -229,13 +232,13 @@ def read_toml(text: str) -> TomlDocument:
     """Read a text.
 
     Args:
-        text: the whole.
+        text: whole text.
     """
     return _Reader(text.replace("\r\n", "\n")).read()
 
 
 class _WrongError(Exception):
-    """The rest of the statement cannot be read; the error may be at another place."""
+    """The rest of the statement cannot be read. The error may be at another place."""
 
     def __init__(self, at: int, reason: str, place: int | None = None) -> None:
         super().__init__(reason)
@@ -243,11 +246,11 @@ class _WrongError(Exception):
 
 
 class _EnoughError(Exception):
-    """Too many errors to continue."""
+    """There are too many errors to continue."""
 
 
 class _Reader:
-    """Reads one text."""
+    """A reader of one text."""
 
     def __init__(self, text: str) -> None:
         self._text, self._at, self._whole = text, 0, True
@@ -280,7 +283,7 @@ class _Reader:
         return bisect_right(self._starts, min(at, len(self._text)))
 
     def _go_on_behind(self, start: int, at: int) -> None:
-        """Go to the line of the error if the statement started before it, else to the next."""
+        """Go to the line of the error if the statement started before it, or to the next line."""
         line = self._line(at)
         if at < len(self._text) and line > self._line(start):
             self._at = self._starts[line - 1]
@@ -302,7 +305,7 @@ class _Reader:
         return self._text.startswith(signs, self._at)
 
     def _rest(self) -> str:
-        """Return the start of the text here, for messages."""
+        """Return the start of the text at the current position, for messages."""
         rest = self._text[self._at : self._at + 30].partition("\n")[0].strip()
         return repr(rest) if rest else "the end of the line"
 
@@ -412,7 +415,7 @@ class _Reader:
         return _Leaf(self._line(start), BROKEN)
 
     def _scalar(self, token: str) -> Any:
-        """Return the value of a token; report an invalid one, and return BROKEN."""
+        """Return the value of a token. Report an invalid token, and return BROKEN."""
         if _WHOLE.fullmatch(token):
             return int(token)
         if token.isprintable() and _SIMPLE.fullmatch(token):  # a parser for each takes long
@@ -470,9 +473,9 @@ class _Reader:
         return table
 
     def _skip_in_inline(self, *, known: bool) -> bool:
-        """Skip blanks; return whether they contained a new line.
+        """Skip blanks. Return whether they contained a new line.
 
-        A new line is an error here; it is reported once.
+        A new line is an error here, which is reported once.
         """
         self._skip(_BLANK)
         if not (self._is("\n") or self._is("#")):

@@ -7,7 +7,7 @@ r"""The text format of a recorded run.
     0.710000 < OK:output\n
     2.000000 .
 
-Each line has the time of the device's tick in seconds, a mark and a text. The marks:
+Each line has the time of the device's tick in seconds, a mark and a text. The marks are:
 
 - `>` is traffic to the device, `<` is traffic from the device. Bytes are written by
   `byte_text.escape`.
@@ -31,7 +31,7 @@ _VERSION: Final = 1
 RESET: Final = "reset"
 
 Config = Mapping[str, str | int | float | None]
-"""Configuration of a device, as in the header of its trace."""
+"""Configuration of a device as in the header of its trace."""
 
 BEGIN: Final = "# tickrig-trace v"
 _VERSION_LINE: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
@@ -62,7 +62,7 @@ class Header:
     config: Config = field(default_factory=dict)
 
     def encode(self) -> str:
-        """Write the first line, without LF."""
+        """Return the first line without LF."""
         return f"# tickrig-trace v{_VERSION} {self.device} {json.dumps(dict(self.config))}"
 
 
@@ -71,10 +71,10 @@ class Record:
     """One line of a trace.
 
     Attributes:
-        at_us: the time of the tick.
+        at_us: time of the tick.
         mark: kind of the line.
-        data: the traffic of `>` and `<`.
-        text: the text of `!`: `NAME=VALUE`, or `reset`.
+        data: traffic of `>` and `<`.
+        text: text of `!`, which is `NAME=VALUE` or `reset`.
         line: number of the line in its file, from 1.
     """
 
@@ -85,7 +85,7 @@ class Record:
     line: int = 0
 
     def encode(self) -> str:
-        """Write the line, without LF."""
+        """Return the line without LF."""
         rest = self.text if self.mark is Mark.PHYSICAL else escape(self.data)
         return f"{format_time(self.at_us)} {self.mark} {rest}".rstrip()
 
@@ -97,7 +97,10 @@ class Record:
 
 
 def trace_text(data: bytes) -> str:
-    """Return the text of a trace; TraceError if it is empty, or its first line is incomplete."""
+    """Return the text of a trace.
+
+    Raise TraceError if it is empty or its first line is incomplete.
+    """
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError as error:
@@ -110,7 +113,7 @@ def trace_text(data: bytes) -> str:
 
 
 def parse_header(line: str) -> Header:
-    """Read the first line; TraceError if it is not a valid header."""
+    """Read the first line. Raise TraceError if it is not a valid header."""
     version = _VERSION_LINE.match(line)
     if version is not None and int(version[1]) != _VERSION:
         raise TraceError(f"this is trace version {int(version[1])}; versions 1 and 2 are known")
@@ -126,7 +129,7 @@ def parse_header(line: str) -> Header:
 
 
 def parse_record(line: str, number: int) -> Record:
-    """Read a line of the body; TraceError if it is invalid."""
+    """Read a line of the body. Raise TraceError if it is invalid."""
     match = _LINE.fullmatch(line)
     if match is None:
         raise TraceError(f"line {number} is not 'SECONDS MARK TEXT': {line!r:.60}")
@@ -145,7 +148,7 @@ def parse_record(line: str, number: int) -> Record:
 
 
 def parse_records(lines: Iterable[str]) -> Iterator[Record]:
-    """Read the body line by line; times must not decrease, and no line may follow the end."""
+    """Read the body line by line. Times must not decrease, and no line may follow the end."""
     before = Record(0, Mark.PHYSICAL)
     for number, line in enumerate(lines, 2):
         record = parse_record(line, number)

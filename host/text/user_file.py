@@ -1,4 +1,4 @@
-"""Classes of a user's file: `FILE.py:Class`."""
+"""Classes in a user's file, in the notation `FILE.py:Class`."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ SUFFIX: Final = ".py"
 
 
 def find_class(spec: str, base: type[Any]) -> type[Any]:
-    """Run a user's file and return a class of it.
+    """Run a user's file and return a class in the file.
 
     Args:
-        spec: `FILE.py:Class`.
-        base: what the class must be a subclass of.
+        spec: text `FILE.py:Class`.
+        base: base class that the class must have.
 
     Raises:
-        ValueError: wrong notation, unknown file or class, or the file cannot be run.
+        ValueError: the notation is wrong, the file or class is unknown, or the file cannot be run.
     """
     file, colon, name = spec.rpartition(":")
     if not colon or not file.endswith(SUFFIX):

@@ -15,7 +15,7 @@ def parse_time_us(text: str) -> int:
     """Read a time in microseconds.
 
     Raises:
-        ValueError: not a time.
+        ValueError: the text is not a time.
 
     >>> parse_time_us("1.5s"), parse_time_us("200ms"), parse_time_us("3")
     (1500000, 200000, 3000000)
@@ -28,7 +28,7 @@ def parse_time_us(text: str) -> int:
 
 
 def parse_time_with_unit_us(text: str) -> int:
-    """Read a time in microseconds; the unit is required, except for 0.
+    """Read a time in microseconds. The unit is required, except for 0.
 
     Raises:
         ValueError: the text is not a time, or has no unit.
@@ -46,8 +46,8 @@ def us_of(duration: int | str) -> int:
     """Return a duration in microseconds.
 
     Raises:
-        TypeError: a number that is not whole.
-        ValueError: a text that is not a time or has no unit, or a negative number.
+        TypeError: the number is not whole.
+        ValueError: the text is not a time or has no unit, or the number is negative.
 
     >>> us_of("1.5s"), us_of(250)
     (1500000, 250)
@@ -61,7 +61,7 @@ def us_of(duration: int | str) -> int:
 
 
 def format_time(t_us: int) -> str:
-    """Write a time in seconds, as in traces and transcripts.
+    """Return a time in seconds as text, as in traces and transcripts.
 
     >>> format_time(310_000)
     '0.310000'
@@ -77,7 +77,7 @@ def parse_size(text: str) -> int:
     """Read a size in bytes.
 
     Raises:
-        ValueError: not a size.
+        ValueError: the text is not a size.
 
     >>> parse_size("4096"), parse_size("64k"), parse_size("16M")
     (4096, 65536, 16777216)
@@ -92,7 +92,7 @@ MOST_PORT: Final = 0xFFFF
 
 
 def parse_port(text: str) -> int | None:
-    """Read a TCP port, 0..65535; None if it is invalid, with any number of digits.
+    """Read a TCP port, 0..65535. Return None if it is invalid, with any number of digits.
 
     >>> parse_port("7000"), parse_port("007000"), parse_port("0100000"), parse_port("-1")
     (7000, 7000, None, None)
@@ -104,7 +104,7 @@ def parse_port(text: str) -> int | None:
 
 
 def counted(number: int, noun: str) -> str:
-    """Write a number with its noun.
+    """Return a number with its noun.
 
     >>> counted(1, "test"), counted(2, "test")
     ('1 test', '2 tests')
@@ -113,11 +113,11 @@ def counted(number: int, noun: str) -> str:
 
 
 Setting = int | float | str
-"""Most inputs accept whole numbers only."""
+"""Value of an input. Most inputs accept whole numbers only."""
 
 
 def parse_setting(word: str) -> Setting:
-    """Read a value: a number if it looks like one, else text.
+    """Read a value, which is a number if the text looks like one, or else the text.
 
     >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
     [5, -31, 0.001, 'ready', 'nan']
@@ -145,7 +145,7 @@ def _parse_fraction(word: str) -> float:
 
 
 def split_list(text: str) -> list[str]:
-    """Split a list at its commas; an item with commas needs double quotes.
+    """Split a list at its commas. An item with commas needs double quotes.
 
     >>> split_list('"sdo_slow=1s,count=2", drop')
     ['sdo_slow=1s,count=2', 'drop']
@@ -154,7 +154,7 @@ def split_list(text: str) -> list[str]:
 
 
 def list_item(text: str) -> str:
-    """Write an item of a list, in quotes if it has commas.
+    """Return an item of a list as text, in quotes if it has commas.
 
     >>> list_item("drop"), list_item("sdo_slow=1s,count=2")
     ('drop', '"sdo_slow=1s,count=2"')

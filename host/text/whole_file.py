@@ -19,7 +19,7 @@ def check_file(path: Path, what: str) -> None:
 
     Args:
         path: path of the file.
-        what: its name in messages, such as `report` or `--html`.
+        what: name of the file in messages, such as `report` or `--html`.
 
     Raises:
         ValueError: the folder of the file does not exist or is not writable, or the path is a
@@ -41,8 +41,8 @@ def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
 
     Args:
         path: path of the file.
-        what: its name in messages, such as `--html`.
-        inputs: paths that the run reads; paths that are not files are ignored.
+        what: name of the file in messages, such as `--html`.
+        inputs: paths that the run reads. Paths that are not files are ignored.
 
     Raises:
         ValueError: the file is one of the inputs.
@@ -59,15 +59,15 @@ def _are_one(path: Path, other: Path) -> bool:
 
 
 def is_special(path: Path) -> bool:
-    """Return whether it is something else than a file or folder, such as a pipe."""
+    """Return whether a path is neither a file nor a folder, such as a pipe."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def check_writable(folder: Path) -> None:
-    """Check whether files can be made in a folder, by making a file; the folder may be missing.
+    """Check whether files can be made in a folder, by making a file. The folder may be missing.
 
     Raises:
-        OSError: no file can be made there.
+        OSError: no file can be made in the folder.
     """
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
@@ -80,10 +80,10 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Replace a file after the new content is on the disk; write directly to a pipe and the like.
+    """Replace a file after the new content is on the disk. Write directly to a pipe and the like.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged.
+        OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged.
     """
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as beside:
@@ -92,13 +92,13 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the path of a new file; it replaces the given file at the end of the block.
+    """Yield the path of a new file, which replaces the given file at the end of the block.
 
     The new file has the same name, in a new folder next to the given file. If the path is not a
     regular file, for example a pipe, the path itself is yielded.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged. An
+        OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged. An
             OSError of the block is raised in the same way.
     """
     from tempfile import mkdtemp  # noqa: PLC0415 - slow, and a TAB needs none
@@ -151,14 +151,14 @@ _BINARY: Final[int] = getattr(os, "O_BINARY", 0)
 
 
 class LineFile:
-    """A file of lines, each written at once, so that no line is lost if the process is killed.
+    """A file of lines. Each line is written at once, so that killing the process loses no line.
 
     If writing fails, the recording ends with one warning, and the run continues.
 
     Args:
-        path: the file; an existing file is replaced.
-        first: its first line.
-        running: what continues without the recording, for the warning.
+        path: path of the file. An existing file is replaced.
+        first: first line of the file.
+        running: description of what continues without the recording, used in the warning.
 
     Attributes:
         error: reason for the early end of the recording, empty if there was no error.
@@ -187,7 +187,7 @@ class LineFile:
             self._close()
 
     def close(self, last: str) -> None:
-        """Write the last line and close the file; closing it again has no effect."""
+        """Write the last line and close the file. Closing it again has no effect."""
         self.write([last])
         self._close()
 

@@ -18,7 +18,7 @@ from tickrig.host.text.document import FileMistake, FilePlace, Item, Key, Scalar
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 _WIDEST: Final = 1_000
-"""Largest number of bits of a number; a longer one remains a text."""
+"""Maximum number of bits of a number. A longer number remains a text."""
 _DIGITS: Final = frozenset("0123456789.")
 _MERGE: Final = "tag:yaml.org,2002:merge"
 
@@ -51,18 +51,18 @@ _MEANT: Final = {
     "could not find expected ':'": "no colon with a space behind it, here or in the line before",
     "cannot start any token": "{}; put it into quotes",
 }
-"""Meaning of messages of PyYAML, by their start."""
+"""Meanings of PyYAML's messages, by the start of the message."""
 
 
 def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...]]:
-    """Read a text.
+    """Read a YAML text.
 
     Args:
-        text: the whole file.
+        text: content of the whole file.
         name: name of the file in places.
 
     Returns:
-        The tree, or None if the text has none; and the errors.
+        The tree, or None if the text has none, and the errors.
     """
     try:
         root = _composed(text)
@@ -102,7 +102,7 @@ def _in_a_line(reason: str) -> str:
 
 
 class _Tree:
-    """Makes items from nodes.
+    """A factory that makes items from nodes.
 
     The item of an anchored node is made only once, so that nested anchors in a file cannot exhaust
     the memory.
@@ -139,7 +139,10 @@ class _Tree:
         return Item(self._scalar(node), place, shorten(str(node.value)))
 
     def _mapping(self, node: yaml.MappingNode, place: FilePlace) -> Item:
-        """Make a mapping: first the items of `<<`, then its own; the last duplicate key counts."""
+        """Make a mapping from the items of `<<`, then its own items.
+
+        The last duplicate key counts.
+        """
         fields: dict[Key, Item] = {}
         keys: dict[Key, FilePlace] = {}
         own: list[tuple[yaml.Node, yaml.Node]] = []
@@ -174,7 +177,7 @@ class _Tree:
         return [item for item in items if item.is_mapping]
 
     def _check_number(self, node: yaml.Node) -> None:
-        """Warn about a number that both readers read differently; in quotes it is a text."""
+        """Warn about a number that the two readers read differently. In quotes, it is a text."""
         text = str(node.value)
         if not isinstance(node, yaml.ScalarNode) or node.style is not None:
             return
@@ -185,7 +188,7 @@ class _Tree:
                     return
 
     def _scalar(self, node: yaml.Node) -> Scalar:
-        """Return the value of a scalar in YAML 1.1; dates remain texts."""
+        """Return the value of a scalar in YAML 1.1. Dates remain texts."""
         try:
             value = self._plain.construct_object(node)
         except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, OverflowError):

@@ -1,4 +1,4 @@
-"""Scripts that set a node up (ours: K16; PDO procedure: CiA 301, PDO mapping parameter)."""
+"""Scripts that set up a node (ours: K16; PDO procedure: CiA 301, PDO mapping parameter)."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _EVENT: Final = 5
 """Sub-indices of a communication parameter."""
 
 _PROBE_US: Final = 1_000_000
-"""Number of device type requests to a node that has not sent anything yet."""
+"""Interval between device type requests to a node that has not sent anything yet."""
 
 
 def probe() -> Script[None]:
-    """Ask for the device type until there is an answer, be it an abort."""
+    """Request the device type until an answer arrives, which may be an abort."""
     while True:
         try:
             yield from upload_number(_DEVICE_TYPE, 0)
@@ -44,7 +44,7 @@ def probe() -> Script[None]:
 def boot(
     entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]
 ) -> Script[tuple[PdoLayout, ...]]:
-    """Set a node up: identity, heartbeat, values, PDOs; return the PDOs that are enabled.
+    """Set up a node with identity, heartbeat, values and PDOs. Return the enabled PDOs.
 
     Raises:
         WrongIdentity: the node is another device.
@@ -65,7 +65,7 @@ def boot(
 
 
 def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
-    """Write given parameters of a PDO while it is off, then enable it if it has a CAN-ID."""
+    """Write given parameters of a PDO while it is off. Then enable the PDO if it has a CAN-ID."""
     cob_id = pdo.cob_id
     if cob_id is None:
         cob_id = (yield from upload_number(index, _COB_ID)) & ~INVALID
@@ -101,7 +101,7 @@ def _check_identity(file: DeviceFile) -> Script[None]:
 
 
 def _read_pdo(index: int, file: DeviceFile) -> Script[PdoLayout | None]:
-    """Read what a PDO carries; None if it is off, multiplexed, or has a 29-bit CAN-ID."""
+    """Read a PDO. Return None if it is off, multiplexed, or has a 29-bit CAN-ID."""
     cob_id = yield from upload_number(index, _COB_ID)
     if cob_id & (INVALID | EXTENDED):
         return None

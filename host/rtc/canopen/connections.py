@@ -1,4 +1,4 @@
-"""What joins nodes: connectors of ports through the PC, and PDO links without it (Fig. 120)."""
+"""Connections of nodes: connectors of ports through the PC, and PDO links without it (Fig. 120)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from tickrig.host.rtc.system.manager import Manager
 
 
 class PortConnections:
-    """Makes connectors as soon as both ports exist; makes them again after a component returns.
+    """Connections of ports, made as soon as both ports exist, and again after a component returns.
 
     Args:
-        manager: has the ports.
-        wanted: connectors to be made.
-        notify: called with the result of each attempt.
+        manager: manager with the ports.
+        wanted: connectors to make.
+        notify: function that is called with the result of each attempt.
 
     Attributes:
         wanted: connectors that have not been made.
@@ -37,12 +37,12 @@ class PortConnections:
 
     @property
     def all(self) -> tuple[definition.RtConnection, ...]:
-        """Those that are made, then those that are wanted."""
+        """The connections that are made, followed by the connections that are not made yet."""
         made = (_entry(profile) for profile in self._manager.connectors)
         return (*made, *self.wanted)
 
     def make(self) -> None:
-        """Make those whose ports are there; one that cannot be is wanted no more."""
+        """Make the connections whose ports exist. A connection that is impossible is given up."""
         for entry in tuple(self.wanted):
             try:
                 if not are_there(self._manager, entry):
@@ -54,7 +54,7 @@ class PortConnections:
             self._connect(entry)
 
     def keep(self, component: RtComponent) -> None:
-        """Want those of a component again that is about to go."""
+        """Schedule the connections of a component that is about to go, so that they return."""
         profiles = (
             connector.profile
             for port in component.ports.values()
@@ -64,14 +64,14 @@ class PortConnections:
         self.wanted += (_entry(profile) for profile in profiles)
 
     def forget(self, first: str, second: str) -> bool:
-        """Want a connection no more; False if it is none that waits."""
+        """Give up a scheduled connection. Return False if it is not scheduled."""
         ends = {first, second}
         waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]
         self.wanted = [entry for entry in self.wanted if entry not in waiting]
         return bool(waiting)
 
     def _refuse(self, text: str) -> None:
-        """Tell once of a port that is not there; another boot of its device may bring it."""
+        """Report a missing port once. Another boot of its device may bring the port."""
         if text not in self._refused:
             self._refused.add(text)
             self._notify(ServerEventType.CONNECTION_REFUSED, 0, text)
@@ -87,7 +87,7 @@ class PortConnections:
 
 
 def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
-    """Return whether both components exist; RtcRefused if an existing one has no such port."""
+    """Return whether both components exist. Raise RtcRefused if an existing one lacks the port."""
     names = {component.instance_name for component in manager.components}
     ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
     for end in ends:
@@ -101,15 +101,15 @@ def _entry(profile: ConnectorProfile) -> definition.RtConnection:
 
 
 class PdoLinks:
-    """Makes PDO links when both nodes are ready: an RPDO receives the TPDO of another node.
+    """PDO links, made when both nodes are ready. An RPDO receives the TPDO of another node.
 
     Args:
-        nodes: the nodes by node-ID.
+        nodes: nodes by node-ID.
         links: PDO links of the System Definition.
-        notify: called with the result for each link.
+        notify: function that is called with the result for each link.
 
     Attributes:
-        links: all wanted links.
+        links: all wanted links, made or not.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class PdoLinks:
         self._own: dict[definition.PdoName, int] = {}  # CAN-ID of an RPDO without its link
 
     def add(self, now_us: int, link: definition.PdoLink) -> None:
-        """Want a link, and make it; ServerRefused if it cannot be now."""
+        """Add a link and make it. Raise ServerRefused if it is impossible now."""
         for other in self.links:
             if other.target == link.target:
                 raise definition.ServerRefused(f"{other.source} and {other.target} are linked")
@@ -130,7 +130,7 @@ class PdoLinks:
         self._make(now_us, link)
 
     def remove(self, now_us: int, link: definition.PdoLink) -> None:
-        """Restore the RPDO's own COB-ID; ServerRefused if there is no such link."""
+        """Restore the RPDO's own COB-ID. Raise ServerRefused if there is no such link."""
         if link not in self.links:
             raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
         own = self._own.get(link.target, self.layout(link.target).cob_id)
@@ -139,7 +139,10 @@ class PdoLinks:
         self._write(now_us, link, own, linked=False)
 
     def make(self, now_us: int, node_id: int) -> None:
-        """Make those of a node that has become ready; a target that stayed still has its own."""
+        """Make the links of a node that has become ready.
+
+        A target that stayed still has its link.
+        """
         for link in self.links:
             if link.target.node == node_id:
                 self._made.pop(link, None)
@@ -153,7 +156,7 @@ class PdoLinks:
                     self._make(now_us, link)
 
     def layout(self, name: definition.PdoName) -> PdoLayout:
-        """Return a PDO of a node that is ready; ServerRefused if it has none."""
+        """Return a PDO of a ready node. Raise ServerRefused if the node does not have it."""
         if name.node not in self._nodes or not self._ready(name.node):
             raise definition.ServerRefused(f"node {name.node} is not ready")
         return find_layout(name, self._nodes[name.node].layouts)
@@ -165,7 +168,7 @@ class PdoLinks:
         check_lengths(link, self.layout(link.source), self.layout(link.target))
 
     def _make(self, now_us: int, link: definition.PdoLink) -> None:
-        """Set the COB-ID of the RPDO to that of the TPDO."""
+        """Set the COB-ID of the RPDO to the COB-ID of the TPDO."""
         cob_id, own = self.layout(link.source).cob_id, self.layout(link.target).cob_id
         if own != cob_id:  # else the node was set up again while it was linked
             self._own[link.target] = own
@@ -192,7 +195,7 @@ class PdoLinks:
 
 
 def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
-    """Return that of a PDO; ServerRefused if it is off."""
+    """Return the layout of a PDO. Raise ServerRefused if the PDO is off."""
     for layout in layouts:
         if layout.index == name.index:
             return layout
@@ -202,7 +205,7 @@ def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLa
 def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
     """Raise ServerRefused if the frames of the two PDOs differ in length.
 
-    An RPDO of Booleans is filled up with dummy bits, but the TPDO of the same Booleans is not.
+    An RPDO with Booleans is filled up with dummy bits. A TPDO with the same Booleans is not.
     """
     if source.size != target.size:
         raise definition.ServerRefused(

@@ -1,4 +1,4 @@
-"""Data between the bus and ports of proxies: by PDO, and by SDO."""
+"""Data between the bus and ports of proxies, by PDO and by SDO."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ _Send = Callable[[int, bytes], None]
 
 
 class PdoDataFlow:
-    """Writes received PDOs to OutPorts, and sends the values of InPorts.
+    """Data flow that writes received PDOs to OutPorts, and sends the values of InPorts.
 
-    Data pass while the proxy is Active. Data to the device also wait until it is Operational.
+    Data pass while the proxy is Active. Data to the device also wait until the device is
+    Operational.
 
     Args:
-        nodes: the nodes by node-ID.
-        send: called with CAN-ID and data.
-        notify: called with events.
+        nodes: nodes by node-ID.
+        send: function that sends a data frame. Its arguments are CAN-ID and data.
+        notify: function that is called with events.
     """
 
     def __init__(self, nodes: Mapping[int, ServedNode], send: _Send, notify: Notify) -> None:
@@ -64,7 +65,7 @@ class PdoDataFlow:
         self.route()
 
     def receive(self, now_us: int, frame: CanFrame) -> bool:
-        """Take a frame; False if it is no PDO of a proxy."""
+        """Process a frame. Return False if it is not a PDO of a proxy."""
         routes = self._sources.get(frame.can_id, ())
         for node, source in routes:
             if len(frame.data) < source.size:
@@ -75,7 +76,7 @@ class PdoDataFlow:
         return bool(routes)
 
     def send_values(self) -> None:
-        """Send the values of InPorts; values that cannot be sent now are dropped."""
+        """Send the values of InPorts. Values that cannot be sent now are dropped."""
         if not self._written:
             return
         connected, places = self._connected, sorted(self._written)
@@ -87,7 +88,7 @@ class PdoDataFlow:
                     self._notify(ServerEventType.VALUE_REFUSED, node.entry.id, text)
 
     def put(self, name: str, value: Struct) -> ReturnCode:
-        """Send a value past all connectors; see `Server.put`."""
+        """Send a value without a connector; see `RtcCanopenServer.put`."""
         for node, sink in self._sinks():
             for port in sink.ports:
                 if port.full_name == name:
@@ -111,15 +112,15 @@ class PdoDataFlow:
 
 
 class SdoDataFlow:
-    """Reads objects for OutPorts, and writes the values of InPorts to objects, by SDO.
+    """Data flow by SDO, which reads objects for OutPorts, and writes the values of InPorts.
 
-    This happens while a proxy is Active and its device Operational. Each port with a pending
+    Transfers happen while a proxy is Active and its device Operational. Each port with a pending
     transfer is transferred once a period at most. One job transfers all such ports of a proxy, and
     the next job begins in the period after the end of this job.
 
     Args:
-        nodes: the nodes by node-ID.
-        notify: called with events.
+        nodes: nodes by node-ID.
+        notify: function that is called with events.
     """
 
     def __init__(self, nodes: Mapping[int, ServedNode], notify: Notify) -> None:
@@ -146,7 +147,10 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Write a value past all connectors in the next period; None if there is no such port."""
+        """Write a value without a connector in the next period.
+
+        Return None if the port is unknown.
+        """
         for node in self._nodes.values():
             for sink in node.proxy.sdo_sinks if node.proxy else ():
                 if sink.port.full_name == name:
@@ -184,7 +188,10 @@ class SdoDataFlow:
     def _transfer(
         self, node: ServedNode, proxy: ProxyRtc, sinks: list[SdoSink], sources: list[SdoSource]
     ) -> Script[None]:
-        """Write, then read; what one port is refused does not hold up the others."""
+        """Write the objects, then read them.
+
+        A refusal for one port does not delay the other ports.
+        """
         for sink in sinks:
             elements, sink.pending = sink.pending or (), None
             yield from self._try(node, sink, sink.layout.write(elements))
@@ -200,7 +207,7 @@ class SdoDataFlow:
     def _try(
         self, node: ServedNode, port: SdoSource | SdoSink, script: Script[None]
     ) -> Script[None]:
-        """Run the transfer of a port; if it is refused, tell so once."""
+        """Run the transfer of a port. If the transfer is refused, report this once."""
         name = port.layout.name
         try:
             yield from script
@@ -212,7 +219,10 @@ class SdoDataFlow:
             self._failed.discard((node.entry.id, name))
 
     def _report(self, node: ServedNode, kind: ServerEventType, port: str, why: str) -> None:
-        """Report a port that does not work, once until it works again."""
+        """Report a port that does not work.
+
+        The report is not repeated until the port works again.
+        """
         at = node.entry.id, port
         if at not in self._failed:
             self._failed.add(at)

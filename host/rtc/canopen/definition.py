@@ -1,4 +1,4 @@
-"""System Definitions: the settings of the server, and what it takes from an EDS."""
+"""System Definitions, which are the settings of the server, and its data from EDS files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ class DefinitionError(ValueError):
     """A System Definition that cannot be used.
 
     Attributes:
-        line: number of the line with the error, from 1; 0 if the error is in no line of the text.
+        line: number of the line with the error, from 1, or 0 if the error is in no line of the
+            text.
     """
 
     def __init__(self, message: str, line: int = 0) -> None:
@@ -34,20 +35,20 @@ class DefinitionError(ValueError):
 
 
 class ServerRefused(ValueError):  # noqa: N818 - what the server did
-    """A command to the server that cannot be."""
+    """A command to the server that is not possible."""
 
 
 # A System Definition: nodes of a bus, and what joins them (NEDO report, Fig. 108; ours: K16).
 
 PDO_COUNT: Final = 512
-"""PDOs in each direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
+"""Number of PDOs per direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
 
 PDO_CAN_IDS: Final = range(0x181, 0x6E0)
-"""What CiA 301 leaves to PDOs; some of it belongs to SDO."""
+"""CAN-IDs that CiA 301 allows for PDOs. Some of them belong to SDO."""
 
 
 class Role(StrEnum):
-    """What a node is to its proxy."""
+    """Role of a node for its proxy."""
 
     DEVICE_RTC = "device_rtc"
     DEVICE = "device"  # off-the-shelf, CiA 301 alone
@@ -56,29 +57,29 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True, order=True)
 class PdoName:
-    """A PDO of a node: `16.tpdo2`.
+    """The name of a PDO of a node, such as `16.tpdo2`.
 
     Attributes:
-        node: node-ID.
-        pdo: `tpdo1`.. or `rpdo1`.., from the point of view of the device.
+        node: node-ID of the node.
+        pdo: name of the PDO, `tpdo1`.. or `rpdo1`.., from the point of view of the device.
     """
 
     node: int
     pdo: str
 
     def __str__(self) -> str:
-        """Write it as a System Definition does."""
+        """Return the name in the notation of a System Definition."""
         return f"{self.node}.{self.pdo}"
 
     @property
     def index(self) -> int:
-        """The communication parameter: 1400h for `rpdo1`, 1801h for `tpdo2`."""
+        """The index of the communication parameter: 1400h for `rpdo1`, 1801h for `tpdo2`."""
         return (0x1800 if self.pdo[0] == "t" else 0x1400) + int(self.pdo[4:]) - 1
 
 
 @dataclass(frozen=True, slots=True)
 class BusEntry:
-    """Which bus, in python-can's words; None leaves it to the command line."""
+    """The bus in the words of python-can. A value of None leaves the choice to the command line."""
 
     channel: str | None = None
     interface: str | None = None
@@ -90,13 +91,13 @@ class MasterEntry:
     """The server as a node.
 
     Attributes:
-        node: its node-ID.
-        heartbeat_ms: its producer heartbeat time, 0 for no heartbeat.
+        node: node-ID of the server.
+        heartbeat_ms: producer heartbeat time of the server, or 0 for no heartbeat.
         rate_hz: rate of the execution context of the proxies.
         remove_after_ms: time without a frame of the node after which its proxy is removed.
         reconnect: whether the connections of a proxy are made again when it returns.
         leave: state in which the server leaves the nodes: `pre_operational` or `stopped`.
-        sync_ms: communication cycle period, 0 for no SYNC.
+        sync_ms: communication cycle period, or 0 for no SYNC.
     """
 
     node: int = 127
@@ -110,15 +111,15 @@ class MasterEntry:
 
 @dataclass(frozen=True, slots=True)
 class PdoEntry:
-    """Parameters that the server writes into a PDO; None leaves what the device has.
+    """Parameters that the server writes into a PDO. A value of None keeps the value of the device.
 
     Attributes:
-        mapping: the objects in it.
-        cob_id: its COB-ID; with bit 31 the PDO stays off, with bit 30 remote requests are not
-            allowed.
+        mapping: objects that the PDO carries.
+        cob_id: COB-ID of the PDO. With bit 31, the PDO stays off. With bit 30, remote requests are
+            not allowed.
         type: transmission type.
-        inhibit_100us: inhibit time in 100 us.
-        event_ms: event timer.
+        inhibit_100us: inhibit time in units of 100 us.
+        event_ms: event timer in ms.
     """
 
     mapping: tuple[MappedObject, ...] | None = None
@@ -133,9 +134,10 @@ class SdoPortEntry:
     """A port whose object is read or written by SDO.
 
     Attributes:
-        index: index of the object; all elements of an array are one value.
+        index: index of the object. All elements of an array are one value.
         direction: `out` if the object is read for the port, `in` if it is written from the port.
-        type: name in Table 4; None for the name that belongs to the data type in the EDS.
+        type: name of the type in Table 4, or None for the name that belongs to the data type in the
+            EDS.
     """
 
     index: int
@@ -145,17 +147,17 @@ class SdoPortEntry:
 
 @dataclass(frozen=True, slots=True)
 class NodeEntry:
-    """A node.
+    """A node of the System Definition.
 
     Attributes:
-        id: node-ID.
-        name: instance name of its proxy.
-        eds: file that describes it; its path is relative to the System Definition.
+        id: node-ID of the node.
+        name: instance name of the node's proxy.
+        eds: EDS of the node. Its path is relative to the System Definition.
         role: the role of the node.
-        heartbeat_ms: its producer heartbeat time.
+        heartbeat_ms: producer heartbeat time of the node.
         ports: names of ports by PDO, such as `tpdo2`.
-        pdos: the parameters that are written into PDOs, also by PDO.
-        restart: how often in a row the node is restarted after it was lost.
+        pdos: parameters that are written into PDOs, by PDO.
+        restart: maximum number of successive restarts after the node was lost.
         sdo_ports: ports of objects that are transferred by SDO, by name.
     """
 
@@ -175,7 +177,7 @@ class SdoEntry:
     """A value that is written while its node boots.
 
     Attributes:
-        size: number of bytes: 1, 2, 4 or 8.
+        size: size of the value in bytes: 1, 2, 4 or 8.
     """
 
     node: int
@@ -200,7 +202,7 @@ class PdoLink:
 
 @dataclass(frozen=True, slots=True)
 class RtConnection:
-    """Ports that are joined through the PC, such as `Palette0.ai` and `Logger0.in`."""
+    """Two ports that are connected through the PC, such as `Palette0.ai` and `Logger0.in`."""
 
     source: str
     target: str
@@ -209,11 +211,13 @@ class RtConnection:
 
 @dataclass(frozen=True, slots=True)
 class StartEntry:
-    """In which order nodes are activated, and whether this happens automatically.
+    """The order in which nodes are activated, and whether this happens automatically.
 
     Attributes:
-        order: node-IDs; nodes that are left out follow in the order of the node list.
-        autoactivate: activate a node when it is ready and all nodes before it are Active.
+        order: node-IDs in the order of activation. Nodes that are left out follow in the order of
+            the node list.
+        autoactivate: whether a node is activated when it is ready and all nodes before it are
+            Active.
     """
 
     order: tuple[int, ...] = ()
@@ -234,13 +238,13 @@ class SystemDefinition:
 
     @property
     def start_order(self) -> tuple[int, ...]:
-        """Node-IDs of all nodes in the order in which they are activated."""
+        """Node-IDs of all nodes in the order of activation."""
         ids = (node.id for node in self.nodes)
         return tuple(dict.fromkeys((*self.start.order, *ids)))
 
     @property
     def named_pdos(self) -> Iterator[PdoName]:
-        """PDOs that are given a port name, parameters or a link."""
+        """PDOs that have a port name, parameters or a link."""
         for node in self.nodes:
             for name in (*node.ports, *node.pdos):
                 yield PdoName(node.id, name)
@@ -249,7 +253,7 @@ class SystemDefinition:
 
 
 _IDENTITY: Final = ((0x1000, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3))
-"""Device type, vendor-ID, product code, revision number; the serial number is of one device."""
+"""Device type, vendor-ID, product code and revision number. A serial number is of one device."""
 
 _ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _RPDOS: Final = range(0x1400, 0x1600)
@@ -261,9 +265,9 @@ class MappableObject:
     """An object that PDOs of a device may carry.
 
     Attributes:
-        mapped: its mapping entry.
-        name: its name in the EDS.
-        way: Access.TPDO, Access.RPDO or both.
+        mapped: mapping entry of the object.
+        name: name of the object in the EDS.
+        way: direction of the PDOs, which is Access.TPDO, Access.RPDO or both.
     """
 
     mapped: MappedObject
@@ -273,16 +277,16 @@ class MappableObject:
 
 @dataclass(frozen=True, slots=True)
 class DeviceFile:
-    """A kind of device.
+    """A kind of device, as its EDS describes it.
 
     Attributes:
-        identity: values of `_IDENTITY` that the file gives.
-        defaults: bytes of the power-on values that the file gives; the node-ID is not added.
-        data_types: data type by index and sub-index.
+        identity: values of `_IDENTITY` that the file contains.
+        defaults: power-on values in the file, as bytes. The node-ID is not added.
+        data_types: data types by index and sub-index.
         pdos: PDO communication parameters of the device.
         relative: entries of `defaults` to which a device adds its node-ID.
-        findings: errors in the file; the objects that they concern are not used.
-        mappable: objects that its PDOs may carry.
+        findings: errors in the file. Objects with errors are not used.
+        mappable: objects that the PDOs of the device may carry.
     """
 
     identity: Mapping[tuple[int, int], int]
@@ -298,7 +302,7 @@ def read_device_file(path: Path) -> DeviceFile:
     """Read an EDS, DCF, XDD or XDC.
 
     Raises:
-        DefinitionError: it cannot be read.
+        DefinitionError: the file cannot be read.
     """
     device, findings = _read(path)
     defaults = {

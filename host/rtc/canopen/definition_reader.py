@@ -1,4 +1,4 @@
-r"""Read a System Definition (ours: K16); YAML, so JSON is read as well.
+r"""Read a System Definition (ours: K16). The format is YAML, so JSON is also accepted.
 
 >>> item = _compose("a: 0x10\nb: [1, x]")
 >>> _read_table(item, "file", {"a": whole(0, 99), "b": many(whole(0, 9))})
@@ -23,11 +23,11 @@ from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 
 _Reader = Callable[[Item, str], Any]
-"""Reads a value of the tree; the text says what it is of, for people."""
+"""Function that reads a value of the tree. Its text names the value in messages."""
 
 
 def _compose(text: str) -> Item:
-    """Read a text into its tree; DefinitionError if it is no YAML, or empty."""
+    """Read a text into its tree. Raise DefinitionError if it is not YAML, or empty."""
     tree, wrong = read_yaml(text, "")
     for one in wrong:
         if one.rule not in _OF_BUS_FILES:
@@ -38,7 +38,7 @@ def _compose(text: str) -> Item:
 
 
 def _refuse(where: Item | FilePlace, message: str) -> NoReturn:
-    """Raise a DefinitionError with the line of a value, or of a key."""
+    """Raise a DefinitionError with the line of a value or of a key."""
     place = where.place if isinstance(where, Item) else where
     raise definition.DefinitionError(message, place.line)
 
@@ -96,7 +96,10 @@ def many(item: _Reader) -> _Reader:
 
 
 def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
-    """Read a list whose items differ in the text that `twice` makes of each: `node 5 is there`."""
+    """Read a list whose items must differ.
+
+    `twice` makes the text of the error, such as `node 5 is there`.
+    """
 
     def read(node: Item, place: str) -> tuple[Any, ...]:
         seen: set[str] = set()
@@ -115,7 +118,7 @@ def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
 
 
 def whole(low: int, high: int) -> _Reader:
-    """Read a whole number of a range, decimal or 0x.."""
+    """Read a whole number in a range, decimal or 0x..."""
 
     def read(node: Item, place: str) -> int:
         value = plain(node)
@@ -151,7 +154,7 @@ def text(node: Item, place: str) -> str:
 
 
 def _matching(pattern: re.Pattern[str], like: str) -> Callable[[Item, str], str]:
-    """Read a text of a pattern; `like` shows one to people."""
+    """Read a text that matches a pattern. `like` is an example for messages."""
 
     def read(node: Item, place: str) -> str:
         value = text(node, place)
@@ -174,14 +177,14 @@ def _one_of(*words: str) -> _Reader:
 
 
 def plain(node: Item) -> Any:
-    """Return a scalar; of anything else, what it is called."""
+    """Return a scalar. For other nodes, return the name of their kind."""
     if node.is_list:
         return "a list"
     return "a table" if node.is_mapping else node.value
 
 
 _OF_BUS_FILES: Final = ("yaml-number", "yaml-value")
-"""Rules of `read_yaml` for values; the readers here say what they take."""
+"""Rules of `read_yaml` for values. The readers in this module report the allowed values."""
 _LEAVE: Final = ("pre_operational", "stopped")
 _SIZES: Final = (1, 2, 4, 8)
 
@@ -199,7 +202,7 @@ def read_definition(path: Path) -> definition.SystemDefinition:
 
     Raises:
         OSError: the file cannot be read.
-        DefinitionError: the definition cannot be used; the error has the line and the reason.
+        DefinitionError: the definition cannot be used. The error has the line and the reason.
     """
     try:
         return parse_definition(path.read_text("utf-8"))
@@ -213,7 +216,7 @@ def parse_definition(content: str) -> definition.SystemDefinition:
     """Read a System Definition.
 
     Raises:
-        DefinitionError: the text is not a valid definition; the error has the line and the reason.
+        DefinitionError: the text is not a valid definition. The error has the line and the reason.
     """
     root = _compose(content)
     known = _children(root, "the file")
@@ -322,7 +325,7 @@ def _pdo(node: Item, place: str) -> definition.PdoEntry:
 
 
 def _cob_id(node: Item, place: str) -> int:
-    """Read a CAN-ID of a PDO, with bit 31 if it is off, with bit 30 without remote requests."""
+    """Read a CAN-ID of a PDO. Bit 31 means that the PDO is off, bit 30 excludes remote requests."""
     flags = INVALID | FLAG_30
     ids = definition.PDO_CAN_IDS
     number = whole(ids.start, flags | ids.stop - 1)(node, place)

@@ -1,4 +1,4 @@
-"""Write a System Definition as `parse_definition` reads it; what has its default is left out."""
+"""Write a System Definition in the format of `parse_definition`. Default values are left out."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _Table = dict[str, Any]
 
 
 class _Hex(int):
-    """A number that is written 0x.."""
+    """A number that is written as 0x..."""
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes `_Hex` as such, and repeats values in place of referring to them."""
+    """Dumper that writes `_Hex` as such, and repeats values in place of anchors."""
 
     def ignore_aliases(self, data: object) -> bool:
         """Write no anchors."""
@@ -48,12 +48,13 @@ _Dumper.add_representer(_Hex, _represent)
 
 
 def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
-    """Write a System Definition; if that fails, the old file is kept unchanged.
+    """Write a System Definition. If that fails, the old file is kept unchanged.
 
     Args:
-        definition: the definition.
-        folder: folder to which the paths of its EDS files are relative now.
-        path: the file; in the file the paths of EDS files are relative to the file's folder.
+        definition: System Definition to write.
+        folder: folder to which the paths of the EDS files are relative now.
+        path: path of the file. In the file, the paths of EDS files are relative to the folder of
+            the file.
 
     Raises:
         OSError: the file cannot be written.
@@ -63,7 +64,7 @@ def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> N
 
 
 def write_definition(definition: SystemDefinition) -> str:
-    """Return the text."""
+    """Return the definition as text."""
     content = {name: value for name, value in _sections(definition) if value}
     return yaml.dump(
         content,
@@ -86,7 +87,7 @@ def _sections(definition: SystemDefinition) -> Iterator[tuple[str, _Table | list
 
 
 def _changed(value: DataclassInstance) -> _Table:
-    """Return the fields that are not as by default, by their keys in the file."""
+    """Return the fields whose values are not the default, by their keys in the file."""
     return {
         item.metadata.get("key", item.name): getattr(value, item.name)
         for item in fields(value)

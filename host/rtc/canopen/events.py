@@ -1,4 +1,4 @@
-"""What happens to the nodes of a server, by name."""
+"""The events of the nodes of a server, by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from tickrig.host.text.page_text import json_text
 
 KEPT: Final = 10_000
-"""Events that a log keeps; older ones are dropped."""
+"""Number of events that a log keeps. Older events are dropped."""
 
 
 class ServerEventType(StrEnum):
@@ -50,12 +50,12 @@ class ServerEventType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ServerEvent:
-    """Something that happened.
+    """An event of the server.
 
     Attributes:
         at_us: time on the clock of the server.
-        node: node-ID, 0 if the event belongs to no node.
-        text: additional text for people.
+        node: node-ID, or 0 if the event belongs to no node.
+        text: additional text for the user.
     """
 
     at_us: int
@@ -64,13 +64,13 @@ class ServerEvent:
     text: str = ""
 
     def __str__(self) -> str:
-        """Write it for people."""
+        """Return the event as text for the user."""
         node = f" node {self.node}" if self.node else ""
         more = f": {self.text}" if self.text else ""
         return f"{self.at_us / 1e6:.6f} {self.kind}{node}{more}"
 
     def to_json(self) -> str:
-        """Write it as one line of JSON."""
+        """Return the event as one line of JSON."""
         return json_text(
             {"at_us": self.at_us, "event": self.kind, "node": self.node, "text": self.text}
         )
@@ -80,17 +80,17 @@ EventListener = Callable[[ServerEvent], None]
 
 
 class Notify(Protocol):
-    """Takes an event, at the present time."""
+    """A function that takes an event at the present time."""
 
     def __call__(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
-        """Take it; node 0 stands for none."""
+        """Take an event. Node 0 stands for no node."""
 
 
 class EventLog:
-    """The events of a server, the latest last.
+    """The events of a server. The latest event is last.
 
     Attributes:
-        listeners: called with each event as it happens.
+        listeners: functions that are called with each event as it happens.
     """
 
     def __init__(self) -> None:
@@ -99,11 +99,11 @@ class EventLog:
 
     @property
     def events(self) -> tuple[ServerEvent, ...]:
-        """Those that are kept."""
+        """The events that are kept."""
         return tuple(self._events)
 
     def notify(self, at_us: int, kind: ServerEventType, node: int = 0, text: str = "") -> None:
-        """Take an event."""
+        """Add an event."""
         event = ServerEvent(at_us, kind, node, text)
         self._events.append(event)
         for listener in self.listeners:

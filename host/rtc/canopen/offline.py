@@ -1,4 +1,4 @@
-"""What can be said of a System Definition without a bus: its EDS files answer for the nodes."""
+"""Checks of a System Definition without a bus, in which EDS files answer for the nodes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _Layouts = tuple[PdoLayout, ...]
 def boot_offline(
     entry: definition.NodeEntry, file: definition.DeviceFile, writes: Iterable[definition.SdoEntry]
 ) -> _Layouts | None:
-    """Return the PDOs that will be on, None where the EDS does not give the values."""
+    """Return the PDOs that will be on, or None if the EDS does not contain the values."""
     values = dict(file.defaults)
     script = boot(entry, file, writes)
     try:
@@ -42,7 +42,7 @@ def boot_offline(
 
 
 def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | None:
-    """Answer as a device that has these values, and takes any."""
+    """Answer as a device that has these values and accepts any value."""
     match sdo.parse_request(step.request) if isinstance(step, SdoRequest) else None:
         case sdo.UploadInitiateRequest(index=index, sub=sub):
             if (data := values.get((index, sub))) is None:
@@ -60,10 +60,12 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Return the settings that nodes on the bus will refuse, if devices match their EDS.
 
     The result also names PDOs that several nodes send with one COB-ID, although no node refuses
-    them. Nodes whose EDS leaves values out are not checked, nor are components that do not exist.
+    them. Nodes whose EDS leaves values out are not checked. Components that do not exist are not
+    checked either.
 
     Args:
-        server: it gets proxies without devices, and cannot be used otherwise afterwards.
+        server: server that gets proxies without devices. The server cannot be used otherwise
+            afterwards.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():
@@ -125,10 +127,10 @@ def _connections(server: RtcCanopenServer) -> Iterator[str]:
 
 
 def draw_graph(server: RtcCanopenServer) -> str:
-    """Return the graph: connections through the PC, and PDO links dashed.
+    """Return the graph with connections through the PC, and with dashed PDO links.
 
     Args:
-        server: it cannot be used otherwise afterwards, as after `check_offline`.
+        server: server that cannot be used otherwise afterwards, as after `check_offline`.
     """
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}

@@ -1,4 +1,4 @@
-"""Keeps the life cycle of a proxy and the NMT state of its device together (ours: K14, K15)."""
+"""Synchronization of a proxy's life cycle with the NMT state of its device (ours: K14, K15)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 # Scripts for the operations on a proxy (ours: section 4.3 of the digest, K14, K21).
 
 _CONFIRM_US: Final = 300_000
-"""The least time in which a device has to report the state that was asked for."""
+"""Minimum time limit for a device to report the requested state."""
 
 _CONTROLWORD: Final = 0x6040
 _STATUSWORD: Final = 0x6041
@@ -37,11 +37,11 @@ _LOOK_US: Final = 10_000
 _STATE_BITS: Final = 0x6F
 _ENABLING: Final = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
 _DISABLING: Final = ((0x07, 0x23), (0x06, 0x21))
-"""Controlword, and the bits of the statusword that confirm it (CiA 402-2)."""
+"""Controlwords, and the statusword bits that confirm each controlword (CiA 402-2)."""
 
 
 def _confirm_us(entry: NodeEntry) -> int:
-    """Return the time in which a node has to confirm (K14)."""
+    """Return the time limit for a node to confirm a command (K14)."""
     return max(3_000 * entry.heartbeat_ms, _CONFIRM_US)
 
 
@@ -78,7 +78,7 @@ def _disable(entry: NodeEntry) -> Script[None]:
 
 
 def _reset_drive(entry: NodeEntry) -> Script[None]:
-    """Reset the fault by SDO, so not in Stopped; then reset the node, whatever the result."""
+    """Reset the fault by SDO, except in Stopped. Then reset the node, whatever the result is."""
     try:
         yield from _enter_pre_operational(entry)
         yield from download_number(_CONTROLWORD, 0, 0, 2)
@@ -90,7 +90,10 @@ def _reset_drive(entry: NodeEntry) -> Script[None]:
 
 
 def _control(entry: NodeEntry, words: tuple[tuple[int, int], ...]) -> Script[None]:
-    """Write controlwords, each when the statusword has confirmed the one before."""
+    """Write controlwords.
+
+    Each follows when the statusword has confirmed the previous controlword.
+    """
     for controlword, wanted in words:
         yield from download_number(_CONTROLWORD, 0, controlword, 2)
         for _ in range(_confirm_us(entry) // _LOOK_US):
@@ -114,19 +117,19 @@ _LIFE_CYCLES: Final[Mapping[Role, _LifeCycleScripts]] = {
 
 
 _WELL_US: Final = 60_000_000
-"""A node that was well for so long has all its restarts again."""
+"""Time without a fault after which a node has all its restarts again."""
 
 
 class _RestartCounter:
-    """Counts the restarts of a node.
+    """Counter of the restarts of a node.
 
     Args:
-        most: largest number of restarts in a row, 0 for no restarts.
+        most: maximum number of successive restarts, or 0 for no restarts.
 
     Attributes:
-        pending: the node was lost, and was not restarted yet.
-        to_activate: the node was Active, and is to be activated again once it is Inactive.
-        was_active: the node was Active when it was lost.
+        pending: whether the node was lost, and was not restarted yet.
+        to_activate: whether the node was Active, and will be activated again once it is Inactive.
+        was_active: whether the node was Active when it was lost.
     """
 
     def __init__(self, most: int) -> None:
@@ -134,7 +137,7 @@ class _RestartCounter:
         self.pending = self.to_activate = self.was_active = False
 
     def lose(self, now_us: int, *, active: bool) -> None:
-        """Take note that a node was lost, without anybody's will."""
+        """Record that a node was lost without a request of a user."""
         if now_us - self._last_us >= _WELL_US:
             self._made = 0
         self.pending = True
@@ -142,22 +145,28 @@ class _RestartCounter:
         self.to_activate = False
 
     def forget(self) -> None:
-        """Leave it to a person."""
+        """Leave the node to the user."""
         self.pending = self.to_activate = self.was_active = False
 
     def leave(self) -> None:
-        """Skip this if a person has already acted; a running restart continues."""
+        """Skip the restart if a user has already acted. A running restart continues."""
         if self.pending:
             self.forget()
 
     def by_hand(self) -> bool:
-        """Leave it to a person who restarts it now; return whether it was lost while Active."""
+        """Leave the node to the user, who restarts it now.
+
+        Return whether it was lost while Active.
+        """
         active = self.was_active or self.to_activate
         self.forget()
         return active
 
     def take(self, now_us: int) -> str:
-        """Begin a restart; return which, as `1 of 3`, or nothing if none is left."""
+        """Begin a restart.
+
+        Return its number, such as `1 of 3`, or an empty text if none is left.
+        """
         if self._made >= self._most:
             self.pending = False
             return ""
@@ -168,30 +177,30 @@ class _RestartCounter:
 
 
 _AUTOMATIC: Final = "'restart: 3' of the node"
-"""The key of a System Definition with which a person has nothing to do."""
+"""Key of a System Definition that makes restarts automatic."""
 
 _STATES: Final = {
     NmtState.PRE_OPERATIONAL: LifeCycleState.INACTIVE,
     NmtState.OPERATIONAL: LifeCycleState.ACTIVE,
     NmtState.STOPPED: LifeCycleState.ERROR,
 }
-"""The state of a proxy by that of its device (NEDO report, table 3)."""
+"""State of a proxy by the state of its device (NEDO report, table 3)."""
 
 
 class NodeOperations:
-    """Executes the requests of the RT side on the bus, and follows the state of the device.
+    """Execution of the RT side's requests on the bus, and tracking of the device state.
 
     Args:
-        entry: the node.
-        dialogue: the dialogue with the node.
-        notify: called with events.
+        entry: entry of the node.
+        dialogue: dialogue with the node.
+        notify: function that is called with events.
 
     Attributes:
-        proxy: the RT component; None if there is no proxy.
-        nmt_state: last reported state of the device, None before the first report.
+        proxy: RT component of the node, or None if there is no proxy.
+        nmt_state: last reported NMT state of the device, or None before the first report.
         now_us: the current time.
-        resetting: whether a reset requested by the RT side is not finished.
-        restart: how many automatic restarts are left.
+        resetting: whether a reset that the RT side requested is not finished.
+        restart: counter of the automatic restarts that are left.
     """
 
     def __init__(self, entry: NodeEntry, dialogue: Dialogue, notify: Notify) -> None:
@@ -205,7 +214,7 @@ class NodeOperations:
 
     @property
     def is_inactive(self) -> bool:
-        """Whether there is a proxy, Inactive."""
+        """Whether there is a proxy that is Inactive."""
         return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
@@ -230,7 +239,7 @@ class NodeOperations:
                 self._run("reset", self._life.reset(self._entry))
 
     def follow(self, state: NmtState, *, changed: bool) -> None:
-        """Move the proxy to where the device says it is, unless that is about to change."""
+        """Move the proxy to the state of the device, unless that state is about to change."""
         proxy = self.proxy
         if proxy is None or self._dialogue.moves or proxy.requested is not NOTHING:
             return
@@ -245,32 +254,32 @@ class NodeOperations:
             self._move(proxy, _STATES[state])
 
     def leave_operational(self) -> Script[None]:
-        """Return the script that brings the device to Pre-operational in the way of its role."""
+        """Return the script that brings the device to Pre-operational as its role requires."""
         return self._life.deactivate(self._entry)
 
     def say(self, command: NmtCommand) -> None:
-        """Send a command after all that is under way."""
+        """Send a command after all running requests."""
         self._run("command", _say(command))
 
     def begin(self) -> None:
-        """Drop the request: the device starts again."""
+        """Drop the request, because the device starts again."""
         self._stopping = False
 
     def booted(self) -> None:
-        """Let the proxy leave Error: its device is Pre-operational and set up."""
+        """Let the proxy leave Error, because its device is Pre-operational and set up."""
         self.nmt_state, self.resetting = NmtState.PRE_OPERATIONAL, False
         if self.proxy is not None:
             self._leave_error(self.proxy)
 
     def abort(self) -> None:
-        """Let the proxy go to Error, from which the restarts of its node may bring it back."""
+        """Move the proxy to Error. Automatic restarts of its node may recover it."""
         self.resetting = False
         if self.proxy is not None:
             self.lose()
             self.proxy.contexts[0].abort_component(self.proxy)
 
     def lose(self) -> None:
-        """Note that the device is not what it was, without anybody's will."""
+        """Record that the device was lost or reset without a request of a user."""
         active = self.proxy is not None and self.proxy.state is LifeCycleState.ACTIVE
         self.restart.lose(self.now_us, active=active)
 
@@ -283,7 +292,7 @@ class NodeOperations:
             proxy.contexts[0].reset_component(proxy)
 
     def begin_restart(self, *, to_start: bool = False) -> bool:
-        """Use up one restart and report it; return False if no restart is left.
+        """Use up one restart and report it. Return False if no restart is left.
 
         Args:
             to_start: whether the node is activated without a restart.
@@ -295,7 +304,10 @@ class NodeOperations:
         return bool(which)
 
     def _left_to_do(self) -> str:
-        """Report what a person has to do if there is no restart; nothing after a recovery."""
+        """Report the action that a user must take without a restart.
+
+        Report nothing after a recovery.
+        """
         entry, was_active = self._entry, self.restart.was_active
         hint = "no restart is left" if entry.restart else f"{_AUTOMATIC} does so by itself"
         if self.proxy is not None and self.proxy.state is LifeCycleState.ERROR:
@@ -306,7 +318,7 @@ class NodeOperations:
         return ""
 
     def fail(self, failure: Failure) -> None:
-        """Note what failed, and let the proxy go to Error."""
+        """Record a failure, and move the proxy to Error."""
         self._notify(kind_of(failure), self._entry.id, str(failure))
         self.abort()
 
@@ -339,13 +351,13 @@ class NodeOperations:
                 sink.preset(_CONTROLWORD, _ENABLING[-1][0])
 
     def _stop(self) -> None:
-        """Stop it, and again with each heartbeat until it says that it is."""
+        """Stop the device, and repeat this with each heartbeat until the device reports Stopped."""
         self._stopping = True
         self.say(NmtCommand.STOP)
 
 
 def kind_of(failure: Failure) -> ServerEventType:
-    """Return the event that a failure is."""
+    """Return the event type of a failure."""
     match failure:
         case errors.WrongIdentity():
             return ServerEventType.WRONG_IDENTITY

@@ -1,4 +1,4 @@
-"""Change the PDOs of a node: allowed changes, the scripts that write them, and DCF files.
+"""Changes of the PDOs of a node: allowed changes, scripts that write them, and DCF files.
 
 >>> pdo = PdoDescription(0x190, (0x6000_0108,), relative=False)
 >>> pdo = with_entry(pdo, 1, MappedObject(0x6401, 1, 16), insert=True)
@@ -72,11 +72,11 @@ _DUMMIES: Final = tuple(
     definition.MappableObject(MappedObject(index, 0, bits), f"dummy: {bits} bits", Access.RPDO)
     for index, bits in ((0x0001, 1), (0x0005, 8), (0x0006, 16), (0x0007, 32))
 )
-"""Data types that fill an RPDO up (CiA 301, dummy mapping)."""
+"""Data types that fill up an RPDO (CiA 301, dummy mapping)."""
 
 
 def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.MappableObject, ...]:
-    """Return what a PDO may carry, by its communication parameter; dummies last."""
+    """Return the objects that a PDO may carry, by its communication parameter. Dummies are last."""
     way = Access.TPDO if index in definition.TPDOS else Access.RPDO
     return tuple(one for one in (*file.mappable, *_DUMMIES) if way in one.way)
 
@@ -87,10 +87,10 @@ def with_entry(
     """Return a PDO with another mapping.
 
     Args:
-        pdo: the present PDO.
+        pdo: present PDO.
         place: position of the entry, from 0.
-        entry: the new entry at this position; None removes the present entry.
-        insert: insert the entry before the present one instead of replacing it.
+        entry: new entry at this position, or None to remove the present entry.
+        insert: whether to insert the entry before the present entry, instead of replacing it.
 
     Raises:
         ValueError: the PDO would have more than 64 bits or 64 entries.
@@ -110,7 +110,7 @@ def with_entry(
 
 
 def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
-    """Return a PDO with another CAN-ID, and its flags; ValueError if a PDO cannot have it."""
+    """Return a PDO with another CAN-ID and its flags. Raise ValueError for an invalid CAN-ID."""
     text = words.strip().lower()
     try:
         number = int(text[:-1], 16) if text.endswith("h") else int(text, 0)
@@ -126,7 +126,7 @@ def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
 
 
 def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription:
-    """Return a PDO with another transmission type; ValueError if CiA 301 has no such type."""
+    """Return a PDO with another transmission type. Raise ValueError if CiA 301 has no such type."""
     try:
         number = int(words, 0)
     except ValueError:
@@ -139,7 +139,7 @@ def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription
 
 
 def switched(pdo: PdoDescription) -> PdoDescription:
-    """Return a PDO that is on if it was off, and the reverse; ValueError without a CAN-ID."""
+    """Return a PDO switched on or off. Raise ValueError if it has no CAN-ID."""
     if not pdo.enabled and not pdo.can_id:
         raise ValueError("the PDO has no CAN-ID: give it one first")
     return replace(pdo, cob_id=pdo.cob_id ^ INVALID)
@@ -149,10 +149,11 @@ def switched(pdo: PdoDescription) -> PdoDescription:
 
 
 class _PdoRefused(SdoFailed):
-    """A PDO that a node did not take.
+    """A PDO that a node did not accept.
 
     Attributes:
-        restored: whether the node has its previous values; if not, its next boot writes them.
+        restored: whether the node has its previous values. If not, the next boot of the node writes
+            them.
     """
 
     def __init__(self, message: str, index: int, sub: int, *, restored: bool) -> None:
@@ -161,11 +162,11 @@ class _PdoRefused(SdoFailed):
 
 
 Pdos = Mapping[int, PdoDescription]
-"""By communication parameter."""
+"""PDOs by communication parameter."""
 
 
 def read_pdos(file: definition.DeviceFile) -> Script[Pdos]:
-    """Read all PDOs of a node that can be edited: no multiplexed ones, no 29-bit CAN-IDs."""
+    """Read all PDOs of a node that can be edited, without multiplexed PDOs and 29-bit CAN-IDs."""
     found = {}
     for index in file.pdos:
         if (pdo := (yield from _read_pdo(index, file))) is not None:
@@ -197,10 +198,10 @@ def _optional(index: int, sub: int, file: definition.DeviceFile) -> Script[int]:
 
 
 def _rewrite_pdos(before: Pdos, wanted: Pdos, file: definition.DeviceFile) -> Script[None]:
-    """Write PDOs and read them back; if the node refuses a PDO, restore the old values of all.
+    """Write PDOs and read them back. If the node refuses a PDO, restore the old values of all.
 
     Raises:
-        _PdoRefused: the node refused something, does not answer, or keeps other values.
+        _PdoRefused: the node refused a write, does not answer, or keeps other values.
     """
     begun = list[int]()
     try:
@@ -230,13 +231,16 @@ def _why(error: SdoFailed) -> str:
 
 
 def _write(index: int, there: PdoDescription, wanted: PdoDescription) -> Script[None]:
-    """Write what differs; a CAN-ID must not change while the PDO is on, so it is off first."""
+    """Write the differences. A CAN-ID must not change while the PDO is on, so it is off first."""
     yield from download_number(index, _COB_ID, there.cob_id | INVALID, 4)
     yield from set_pdo(index, _changes(there, wanted))
 
 
 def _changes(there: PdoDescription, wanted: PdoDescription) -> definition.PdoEntry:
-    """Return what `set_pdo` writes; the mapping always, as a step that failed may have cut it."""
+    """Return the parameters for `set_pdo`. The mapping is always included.
+
+    A failed step may have cut the mapping in the node.
+    """
     kind, inhibit, event = wanted.transmission_type, wanted.inhibit_100us, wanted.event_ms
     return definition.PdoEntry(
         tuple(map(MappedObject.parse, wanted.mapping)),
@@ -248,7 +252,7 @@ def _changes(there: PdoDescription, wanted: PdoDescription) -> definition.PdoEnt
 
 
 def _difference(wanted: PdoDescription, found: PdoDescription | None) -> str:
-    """Return in what a node differs from the written values."""
+    """Return the difference between the values of a node and the written values."""
     if found is None:
         return "a multiplexed PDO"
     if found.mapping != wanted.mapping:
@@ -269,13 +273,13 @@ def pdo_name(node_id: int, index: int) -> definition.PdoName:
 
 
 class Rewrite:
-    """Changes PDOs of a node that is served, and sets the node up again.
+    """Rewriting the PDOs of a served node, which is then set up again.
 
     Args:
-        node: the node.
-        before: the PDOs that the node has.
+        node: node to change.
+        before: PDOs that the node has.
         wanted: the new descriptions of some of these PDOs.
-        linked: PDOs that receive the TPDO of another node; their CAN-ID belongs to that TPDO.
+        linked: PDOs that receive the TPDO of another node. Their CAN-ID belongs to that TPDO.
 
     Raises:
         ServerRefused: the node does not answer SDO requests now, or a CAN-ID belongs to a link.
@@ -297,17 +301,20 @@ class Rewrite:
         self._was_active = proxy is not None and proxy.state is LifeCycleState.ACTIVE
 
     def begin(self) -> Script[None]:
-        """Return the script; a node that is lost during it has the old values at its next boot."""
+        """Return the script.
+
+        A node that is lost during the script has the old values at its next boot.
+        """
         self._keep(self._wanted, self._before)
         return self._script()
 
     def done(self) -> None:
-        """Keep the new values, and set the node up with them."""
+        """Keep the new values, and set up the node with them."""
         self._keep(self._before, self._wanted)
         self._boot()
 
     def failed(self, failure: Failure | str) -> None:
-        """Set the node up as it was."""
+        """Set up the node with its previous values."""
         if not isinstance(failure, _PdoRefused) or failure.restored:
             self._node.entry = replace(self._node.entry, pdos=self._pdos)
         self._boot()
@@ -318,7 +325,7 @@ class Rewrite:
         yield from _rewrite_pdos(self._before, self._wanted, self._node.file)
 
     def _keep(self, there: Pdos, values: Pdos) -> None:
-        """Let each boot of the node write these values in place of others."""
+        """Make each boot of the node write these values in place of other values."""
         pdos = {**self._pdos}
         for index in self._wanted:
             name = pdo_name(self._node.entry.id, index).pdo
@@ -326,7 +333,7 @@ class Rewrite:
         self._node.entry = replace(self._node.entry, pdos=pdos)
 
     def _entry(self, name: str, index: int, new: definition.PdoEntry) -> definition.PdoEntry:
-        """Return an entry with what changed; a linked PDO keeps its own CAN-ID."""
+        """Return an entry with its changes. A linked PDO keeps its own CAN-ID."""
         old = self._pdos.get(name, definition.PdoEntry())
         return definition.PdoEntry(
             new.mapping,
@@ -353,7 +360,7 @@ def check_answers(node: ServedNode) -> None:
 
 
 class _Table:
-    """The objects of a device, as `write_dcf` takes them."""
+    """The objects of a device in the form that `write_dcf` needs."""
 
     def __init__(self, device: EdsDevice) -> None:
         self._device = device
@@ -364,7 +371,7 @@ class _Table:
 
 
 def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
-    """Read all values of a node that a DCF contains: the writable parameters in its EDS.
+    """Read all values of a node that a DCF contains, which are the writable parameters in its EDS.
 
     Raises:
         OSError: the EDS cannot be read.
@@ -381,14 +388,14 @@ def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
 def save_dcf(
     path: Path, eds: Path, node_id: int, bit_rate: int, values: Mapping[int, bytes]
 ) -> None:
-    """Write a DCF of a node; if that fails, the old file is kept unchanged.
+    """Write a DCF of a node. If that fails, the old file is kept unchanged.
 
     Args:
-        path: the file.
+        path: path of the file.
         eds: EDS of the node.
-        node_id: 1..127.
-        bit_rate: in bit/s.
-        values: the values read from the node, by index << 8 | sub-index.
+        node_id: node-ID of the node, 1..127.
+        bit_rate: bit rate in bit/s.
+        values: values read from the node. The key is index << 8 | sub-index.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -399,7 +406,7 @@ def save_dcf(
 
 
 def pdos_of_dcf(path: Path, node_id: int, file: definition.DeviceFile, there: Pdos) -> Pdos:
-    """Return the PDOs of a node that differ in a DCF, as the DCF describes them.
+    """Return the PDOs in a DCF that differ from the PDOs of a node.
 
     Raises:
         OSError: the DCF cannot be read.

@@ -1,8 +1,8 @@
-"""A PDO of a device as its proxy has it (NEDO report, Fig. 109, Table 4; ours: K5).
+"""The layout of a device's PDO in its proxy (NEDO report, Fig. 109, Table 4; ours: K5).
 
-A PDO has room for one 64-bit value only, so there are no sequences of 64-bit types. INTEGER8, which
+A PDO has room for only one 64-bit value, so there are no sequences of 64-bit types. INTEGER8, which
 RTC does not have, is a short. UNICODE_STRING of 16 bits is a wide character. The canopen library
-reads A0h, VISIBLE_CHAR, as DOMAIN; no other DOMAIN has 8 bits.
+reads A0h, VISIBLE_CHAR, as DOMAIN. No other DOMAIN has 8 bits.
 
 >>> PDO_FIELD_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
 -2
@@ -31,12 +31,12 @@ from tickrig.wire.rtc_types.rtc import (
 
 @dataclass(frozen=True, slots=True)
 class _PdoFieldType:
-    """How ports represent objects of a data type.
+    """Representation of the objects of a data type in ports.
 
     Attributes:
         row: row of Table 4.
         one: type of a port for one object.
-        many: type of a port for several objects; None if two objects do not fit into a PDO.
+        many: type of a port for several objects, or None if two objects do not fit into a PDO.
         bits: number of bits of one object in a PDO.
     """
 
@@ -46,12 +46,12 @@ class _PdoFieldType:
     bits: int
 
     def decode(self, number: int) -> Value:
-        """Return the value that these bits are."""
+        """Return the value of these bits."""
         value: Value = self.row.decode([number.to_bytes((self.bits + 7) // 8, "little")])
         return value
 
     def encode(self, value: Value) -> int:
-        """Return the bits; FieldError if the value does not fit."""
+        """Return the bits. Raise FieldError if the value does not fit."""
         return int.from_bytes(self.row.encode(value)[0], "little")
 
 
@@ -72,7 +72,7 @@ PORT_KINDS: Final = (
     (table_4.UNSIGNED_LONG_LONG, TimedULongLong, TimedULongLongSeq),
     (table_4.LONG_LONG, TimedLongLong, TimedLongLongSeq),
 )
-"""Rows of Table 4, each with the struct of one value and that of several."""
+"""Rows of Table 4, each with the struct of one value and the struct of several values."""
 
 
 def _field_type(
@@ -93,7 +93,7 @@ PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], _PdoFieldType]] = {
     (DataType.BOOLEAN, 8): _field_type(*_BOOLEAN, 8),
     (DataType.DOMAIN, 8): _field_type(*_CHARACTER),
 }
-"""By data type and bits in the PDO; strings are not among them."""
+"""Field types by data type and bits in the PDO, without strings."""
 
 
 def sequence_of(kind: type[Any], tm: rtc.Time, values: tuple[Value, ...]) -> Struct:
@@ -104,10 +104,10 @@ def sequence_of(kind: type[Any], tm: rtc.Time, values: tuple[Value, ...]) -> Str
 
 
 _PAIR = 0x400
-"""The proxy of a TPDO is an RPDO 400h below, that of an RPDO a TPDO 400h above."""
+"""Index distance: the proxy of a TPDO is an RPDO 400h below, that of an RPDO a TPDO 400h above."""
 
 PARAMETERS = 0x200
-"""From a communication parameter to its mapping parameter."""
+"""Distance from a communication parameter to its mapping parameter."""
 
 
 def proxy_index(index: int) -> int:
@@ -124,8 +124,8 @@ class _PdoField:
     """A mapped object.
 
     Attributes:
-        shift: number of bits before it in the PDO.
-        type: how a port represents the object.
+        shift: number of bits before the field in the PDO.
+        type: representation of the object in ports.
     """
 
     mapped: MappedObject
@@ -139,10 +139,10 @@ class PdoLayout:
 
     Attributes:
         index: index of the communication parameter in the device.
-        cob_id: CAN-ID.
-        fields: the mapped objects, without dummies.
-        bits: length of the PDO.
-        unknown: mapped objects whose type no port has; if there are any, no ports are made.
+        cob_id: CAN-ID of the PDO.
+        fields: mapped objects, without dummies.
+        bits: length of the PDO in bits.
+        unknown: mapped objects whose type no port has. If there are any, no ports are made.
     """
 
     index: int
@@ -153,18 +153,18 @@ class PdoLayout:
 
     @property
     def name(self) -> str:
-        """What a System Definition calls it: `tpdo1`."""
+        """The name of the PDO in a System Definition, such as `tpdo1`."""
         kind = "t" if self.sends else "r"
         return f"{kind}pdo{(self.index & 0x1FF) + 1}"
 
     @property
     def sends(self) -> bool:
-        """Whether the device sends it."""
+        """Whether the device sends the PDO."""
         return self.index in TPDOS
 
     @property
     def size(self) -> int:
-        """Bytes in a frame."""
+        """Number of bytes in a frame."""
         return (self.bits + 7) // 8
 
     def decode(self, data: bytes) -> tuple[Value, ...]:
@@ -176,7 +176,7 @@ class PdoLayout:
         )
 
     def encode(self, values: tuple[Value, ...]) -> bytes:
-        """Return the data of a frame; ValueError if a value does not fit."""
+        """Return the data of a frame. Raise ValueError if a value does not fit."""
         number = 0
         for item, value in zip(self.fields, values, strict=True):
             number |= item.type.encode(value) << item.shift
@@ -189,7 +189,7 @@ def lay_out(
     mapping: tuple[MappedObject, ...],
     data_types: Mapping[tuple[int, int], int],
 ) -> PdoLayout:
-    """Lay a PDO out by its mapping; objects below 20h are dummies without a port."""
+    """Return the layout of a PDO with its mapping. Objects below 20h are dummies without a port."""
     fields, unknown, shift = list[_PdoField](), list[MappedObject](), 0
     for mapped in mapping:
         data_type = data_types.get((mapped.index, mapped.sub), 0)
@@ -205,7 +205,7 @@ def lay_out(
 # Values of a PDO at once.
 
 _PdoDecoder = Callable[[bytes], tuple[Value, ...]]
-"""Takes the data of a frame that is not too short."""
+"""Function that decodes the data of a frame that is not too short."""
 
 _LETTERS: Final[Mapping[tuple[DataType, int], str]] = {
     (DataType.BOOLEAN, 8): "?",
@@ -220,11 +220,11 @@ _LETTERS: Final[Mapping[tuple[DataType, int], str]] = {
     (DataType.REAL32, 32): "f",
     (DataType.REAL64, 64): "d",
 }
-"""Of the struct module, by data type and bits in the PDO."""
+"""Letters of the struct module by data type and bits in the PDO."""
 
 
 def pdo_decoder(layout: PdoLayout) -> _PdoDecoder:
-    """Return a decoder for the layout; it is nine times as fast for four objects.
+    """Return a decoder for the layout. For four objects, it is nine times as fast.
 
     This speed requires that the objects are aligned like the fields of a C struct.
 
@@ -238,7 +238,7 @@ def pdo_decoder(layout: PdoLayout) -> _PdoDecoder:
 
 
 def _struct_letters(layout: PdoLayout) -> str | None:
-    """Return the layout as the struct module writes it; None if it cannot."""
+    """Return the layout in the notation of the struct module, or None if that is impossible."""
     letters, end = "<", 0
     for one in layout.fields:
         letter = _LETTERS.get((one.type.row.data_type, one.type.bits))

@@ -1,4 +1,4 @@
-"""ProxyRTC: a CANopen device as an RT component (NEDO report, Figs. 108 and 109)."""
+"""ProxyRTC, an RT component that represents a CANopen device (NEDO report, Figs. 108 and 109)."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from tickrig.wire.rtc_types.rtc import Time
 
 
 class _PortShape:
-    """The ports of a PDO: one for all its objects, or one for each if their types differ.
+    """The ports of a PDO. All its objects share one port, or have one port each if types differ.
 
     Args:
-        layout: the PDO.
+        layout: layout of the PDO.
         name: name of the port, or the beginning of the names of ports for single objects.
 
     Attributes:
         names: names of the ports.
         types: the type that each port carries.
-        single: whether one port has all objects as a sequence.
+        single: whether one port carries all objects as a sequence.
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
@@ -53,12 +53,12 @@ class _PortShape:
 
 
 class PdoSource:
-    """A TPDO of the device: each frame is written to its OutPorts.
+    """A TPDO of the device. Each frame is written to its OutPorts.
 
     Attributes:
-        layout: the PDO.
-        size: least number of bytes of a frame.
-        ports: the OutPorts.
+        layout: layout of the PDO.
+        size: minimum number of bytes of a frame.
+        ports: OutPorts of the PDO.
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
@@ -70,7 +70,7 @@ class PdoSource:
         )
 
     def receive(self, now_us: int, data: bytes) -> None:
-        """Write what a frame carries; its time stamp is that of reception."""
+        """Write the values in a frame. Their time stamp is the time of reception."""
         tm, values = Time.from_us(now_us), self._decode(data)
         if self._single:
             (port,) = self.ports
@@ -83,14 +83,14 @@ class PdoSource:
 
 
 class PdoSink:
-    """An RPDO of the device: each value that arrives at an InPort is sent in one frame.
+    """An RPDO of the device. Each value that arrives at an InPort is sent in one frame.
 
     If each object has its own port, the frame has the last values of the other objects.
 
     Attributes:
-        layout: the PDO.
-        ports: the InPorts.
-        linked: whether another device sends this PDO; then the server does not send it.
+        layout: layout of the PDO.
+        ports: InPorts of the PDO.
+        linked: whether another device sends this PDO. The server then does not send it.
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
@@ -102,18 +102,18 @@ class PdoSink:
         self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
 
     def preset(self, index: int, value: Value) -> None:
-        """Let an object without a new value be sent as this one."""
+        """Set the value that is sent for an object without a new value."""
         for place, field in enumerate(self.layout.fields):
             if field.mapped.index == index:
                 self._latest[place] = value
 
     def clear(self) -> None:
-        """Drop what has not been sent."""
+        """Drop the values that have not been sent."""
         for port in self.ports:
             port.clear()
 
     def take(self) -> Iterator[tuple[str, Struct]]:
-        """Take all new values, each with the name of its port."""
+        """Return all new values, each with the name of its port."""
         for port in self.ports:
             while port.is_new:
                 value = port.read()
@@ -121,7 +121,7 @@ class PdoSink:
                 yield port.name, value
 
     def encode(self, port: str, value: Struct) -> bytes:
-        """Return the data of the frame that a value makes; ValueError if it does not fit."""
+        """Return the data of the frame for a value. Raise ValueError if the value does not fit."""
         data: Any = getattr(value, "data", None)
         if not self._shape.single:
             latest = list(self._latest)
@@ -140,18 +140,18 @@ class PdoSink:
 _T = TypeVar("_T", bound=Struct)
 
 _TRANSPORT: Final = {"transport": rtc_canopen.PortTransport.SDO.value}
-"""What the profile of such a port says beside what all ports say."""
+"""Additional properties in the profile of such a port."""
 
 
 class _SdoOutPort(OutPort[_T]):
-    """An OutPort that says in its profile what carries it."""
+    """An OutPort whose profile contains its transport."""
 
     def _properties(self) -> Mapping[str, str]:
         return {**super()._properties(), **_TRANSPORT}
 
 
 class _SdoInPort(InPort[_T]):
-    """An InPort that says in its profile what carries it."""
+    """An InPort whose profile contains its transport."""
 
     def _properties(self) -> Mapping[str, str]:
         return {**super()._properties(), **_TRANSPORT}
@@ -159,15 +159,15 @@ class _SdoInPort(InPort[_T]):
 
 @dataclass(frozen=True, slots=True)
 class _SdoPortLayout:
-    """The objects of a port.
+    """The objects of a port that is transferred by SDO.
 
     Attributes:
         name: name of the port.
         direction: `out` if the object is read for the port, `in` if it is written from the port.
         index: index of the object.
         subs: sub-indices of the elements.
-        kind: type of the value, as in Table 4.
-        struct: the struct that the port carries.
+        kind: type of the value as in Table 4.
+        struct: struct that the port carries.
     """
 
     name: str
@@ -178,14 +178,17 @@ class _SdoPortLayout:
     struct: type[Struct]
 
     def read(self) -> Script[tuple[bytes, ...]]:
-        """Read all elements in their order; raises as `upload`."""
+        """Read all elements in their order. Raises as `upload` does."""
         elements = []
         for sub in self.subs:
             elements.append((yield from upload(self.index, sub, self.kind.data_type.size)))
         return tuple(elements)
 
     def decode(self, tm: Time, elements: Sequence[bytes]) -> Struct:
-        """Return the value of the bytes of all elements; FieldError if they are none."""
+        """Return the value of the bytes of all elements.
+
+        Raise FieldError if the bytes are invalid.
+        """
         value: Any = self.kind.decode(elements)
         if not self.kind.element_bits:  # a string ends before the first 0, in C and in CORBA
             value = tuple(map(_text, value)) if self.kind.many else _text(value)
@@ -193,12 +196,15 @@ class _SdoPortLayout:
         return pdo_layout.sequence_of(kind, tm, value) if self.kind.many else kind(tm, value)
 
     def write(self, elements: Sequence[bytes]) -> Script[None]:
-        """Write all elements in their order; raises as `download`."""
+        """Write all elements in their order. Raises as `download` does."""
         for sub, data in zip(self.subs, elements, strict=True):
             yield from download(self.index, sub, data)
 
     def encode(self, value: Struct) -> tuple[bytes, ...]:
-        """Return the bytes of each element; ValueError or TypeError if the value does not fit."""
+        """Return the bytes of each element.
+
+        Raise ValueError or TypeError if the value does not fit.
+        """
         data: Any = getattr(value, "data", None)
         return self.kind.encode(tuple(data) if self.kind.many else data)
 
@@ -207,8 +213,8 @@ class SdoSource:
     """An object of the device whose value goes to an OutPort.
 
     Attributes:
-        layout: the object.
-        port: the OutPort.
+        layout: layout of the object.
+        port: OutPort that gets the value.
     """
 
     def __init__(self, layout: _SdoPortLayout) -> None:
@@ -219,9 +225,9 @@ class SdoSink:
     """An object of the device that receives the newest value of an InPort.
 
     Attributes:
-        layout: the object.
-        port: the InPort.
-        pending: bytes that are to be written; None if there are none.
+        layout: layout of the object.
+        port: InPort that provides the value.
+        pending: bytes that are to be written, or None if there are none.
     """
 
     def __init__(self, layout: _SdoPortLayout) -> None:
@@ -229,14 +235,14 @@ class SdoSink:
         self.pending: tuple[bytes, ...] | None = None
 
     def take(self) -> Struct | None:
-        """Take the newest value; None without a new one."""
+        """Take the newest value, or return None without a new value."""
         value = None
         while self.port.is_new:
             value = self.port.read()
         return value
 
     def clear(self) -> None:
-        """Drop what has not been written."""
+        """Drop the value that has not been written."""
         self.port.clear()
         self.pending = None
 
@@ -244,11 +250,11 @@ class SdoSink:
 def lay_out_sdo_ports(
     entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
 ) -> tuple[tuple[_SdoPortLayout, ...], tuple[str, ...]]:
-    """Return the ports of a node's SDO objects, and for all others why they cannot be made.
+    """Return the ports of a node's SDO objects, and the reasons for impossible ports.
 
     Args:
-        entry: the node.
-        data_types: data types in its EDS, by index and sub-index.
+        entry: entry of the node.
+        data_types: data types in the node's EDS, by index and sub-index.
     """
     made, refused = list[_SdoPortLayout](), list[str]()
     for name, port in entry.sdo_ports.items():
@@ -286,7 +292,7 @@ def _lay_out(
 
 
 def _usual(row: rtc_canopen.CanopenPortType[Any]) -> str:
-    """Return the name of a row that counts without `type`: a Unicode string is a text."""
+    """Return the default name of a row without `type`. A Unicode string is a text."""
     return "" if row is rtc_canopen.WIDE_CHARACTER else row.name
 
 
@@ -298,7 +304,7 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
-    """A request of the RT side that was not yet sent to the bus."""
+    """A request of the RT side that has not been sent to the bus."""
 
     NOTHING = auto()
     ACTIVATE = auto()
@@ -308,20 +314,20 @@ class ProxyRequest(Enum):
 
 
 NOTHING: Final = ProxyRequest.NOTHING
-"""Looked up once: it takes 0.1 us, and each proxy is asked in each period."""
+"""Value that is looked up once, because a look-up takes 0.1 us for each proxy in each period."""
 
 
 class ProxyRtc(RtComponent):
     """An ordinary RT component that represents a device.
 
-    Its callbacks record requests; the server executes them on the bus after the period. on_reset
-    fails until the device has booted again, so the proxy stays in Error until then.
+    The callbacks record requests. The server executes the requests on the bus after the period.
+    on_reset fails until the device has booted again, so the proxy stays in Error until then.
 
-    Not emulated: a CANopen node of its own on the bus (`visible_proxies` of K1).
+    Not emulated: a CANopen node for the proxy on the bus (`visible_proxies` of K1).
 
     Args:
-        entry: its node in the System Definition.
-        layouts: PDOs of the device.
+        entry: node of the proxy in the System Definition.
+        layouts: layouts of the PDOs of the device.
         sdo_layouts: objects of the device that have ports by SDO.
 
     Attributes:
@@ -331,8 +337,9 @@ class ProxyRtc(RtComponent):
         sdo_sources: objects of the device whose values go to OutPorts.
         sdo_sinks: objects of the device that take values from InPorts.
         requested: the request that the callbacks recorded.
-        passing: True between on_activated and on_deactivated; data from the device pass.
-        confirmed: whether the device has reported Operational; then data to the device pass, too.
+        passing: whether data from the device pass, which is True between on_activated and
+            on_deactivated.
+        confirmed: whether the device has reported Operational. Data to the device then also pass.
         ready: whether the device can leave Error.
     """
 
@@ -370,16 +377,16 @@ class ProxyRtc(RtComponent):
 
     @property
     def state(self) -> LifeCycleState:
-        """Its state in its execution context; Created if it has none."""
+        """State in the proxy's execution context, or Created if it has none."""
         return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
 
     def take_request(self) -> ProxyRequest:
-        """Take what was asked for."""
+        """Return the recorded request and clear it."""
         requested, self.requested = self.requested, NOTHING
         return requested
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Let data pass; ask for Operational."""
+        """Let data pass. Request Operational."""
         self.requested, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
         for sink in self.sinks:
             sink.clear()
@@ -388,17 +395,17 @@ class ProxyRtc(RtComponent):
         return _OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Let no data pass; ask for Pre-operational."""
+        """Stop the data. Request Pre-operational."""
         self.requested, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
-        """Ask for Stopped, which takes the place of what on_deactivated asked for."""
+        """Request Stopped. This replaces the request of on_deactivated."""
         self.requested, self.ready = ProxyRequest.ABORT, False
         return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Ask for a reset of the device; RTC_OK once it has booted."""
+        """Request a reset of the device. Return RTC_OK once the device has booted."""
         if self.ready:
             return _OK
         self.requested = ProxyRequest.RESET

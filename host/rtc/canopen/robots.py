@@ -18,10 +18,10 @@ _FULL_PCT: Final = 100.0
 
 
 class Joystick(RtComponent):
-    """Writes the velocity that its stick commands, in each period.
+    """A joystick that writes the velocity of its stick in each period.
 
     Attributes:
-        velocity: OutPort; forward in m/s, to the left in rad/s.
+        velocity: OutPort with the velocity, forward in m/s, and to the left in rad/s.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Joystick", "A stick as a velocity")
@@ -35,12 +35,12 @@ class Joystick(RtComponent):
         self._forward_pct = self._left_pct = 0.0
 
     def tilt(self, forward_pct: float, left_pct: float = 0.0) -> None:
-        """Hold the stick; -100..100 % each, what is beyond counts as full."""
+        """Set the stick to -100..100 % on each axis. Larger values count as full."""
         self._forward_pct = clip(forward_pct, _FULL_PCT)
         self._left_pct = clip(left_pct, _FULL_PCT)
 
     def typed(self, line: str) -> None:
-        """Hold the stick as a person types it: forward, and to the left if given, in per cent."""
+        """Set the stick by typed text: forward in per cent, and optionally to the left."""
         try:
             percents = [float(word) for word in line.split()]
         except ValueError:
@@ -50,7 +50,7 @@ class Joystick(RtComponent):
         self.tilt(*percents)
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Write where the stick is."""
+        """Write the velocity of the stick."""
         v = self._forward_pct / _FULL_PCT * self.full_v.value
         w = self._left_pct / _FULL_PCT * self.full_w.value
         self.velocity.write(
@@ -67,23 +67,23 @@ _LOG: Final = log_of(__name__)
 
 
 class WheeledBase(RtComponent, ABC):
-    """Converts a velocity into wheel speeds, and wheel movements into a pose.
+    """A base that converts a velocity into wheel speeds, and wheel movements into a pose.
 
-    A lateral velocity, or one with an invalid number, is ignored with a line in the log. Without a
-    velocity for `timeout` the wheels stop. If a wheel would be too fast, both sides slow down by
-    the same factor.
+    A lateral velocity, or a velocity with an invalid number, is ignored with a line in the log.
+    Without a velocity for `timeout`, the wheels stop. If a wheel would be too fast, both sides slow
+    down by the same factor.
 
-    Not emulated: acceleration limits; the drives have their own.
+    Not emulated: acceleration limits, because the drives have their own.
 
     Args:
-        instance_name: of the component.
-        radius_m: of the wheels.
-        tread_m: between left and right wheels.
+        instance_name: name of the component.
+        radius_m: radius of the wheels.
+        tread_m: distance between left and right wheels.
 
     Attributes:
-        velocity: InPort; m/s, rad/s.
-        position: OutPort; the estimated position relative to the position at activation.
-        pose: the estimated position, as a pose.
+        velocity: InPort with the velocity in m/s and rad/s.
+        position: OutPort with the estimated position relative to the position at activation.
+        pose: estimated position as a pose.
         refused: number of ignored velocities.
     """
 
@@ -101,22 +101,22 @@ class WheeledBase(RtComponent, ABC):
     @property
     @abstractmethod
     def fastest(self) -> float:
-        """The highest wheel speed that can be commanded, rad/s."""
+        """The highest wheel speed that can be commanded, in rad/s."""
 
     @abstractmethod
     def command(self, tm: rtc.Time, left: float, right: float) -> None:
-        """Tell the drives how fast the wheels of each side are to turn, rad/s."""
+        """Command the speed of the wheels of each side, in rad/s."""
 
     @abstractmethod
     def turned(self, since_s: float) -> tuple[float, float]:
-        """Return how far the wheels of each side have turned since the last call, rad.
+        """Return the rotation of the wheels of each side since the last call, in rad.
 
         Args:
             since_s: time since the last call.
         """
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at zero, standing."""
+        """Begin at zero, with wheels at rest."""
         self.pose, self._twist = Pose(), Twist()
         self._received_us = self._executed_us = ec.now_us
         self.velocity.clear()
@@ -128,7 +128,7 @@ class WheeledBase(RtComponent, ABC):
         return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Command the wheels, and tell where they took it."""
+        """Command the wheels, and write the resulting position."""
         for message in read_all(self.velocity):
             self._take(ec.now_us, message)
         if ec.now_us - self._received_us > 1e6 * self.timeout.value:
@@ -155,20 +155,20 @@ class WheeledBase(RtComponent, ABC):
 # beego: a differential drive on two EPOS (NEDO report, 3.4.43.3; ours: K21).
 
 _TURN: Final = 2**32
-"""Counts after which a position begins again (6064h is INTEGER32)."""
+"""Number of counts after which a position begins again (6064h is INTEGER32)."""
 
 _FASTEST_RPM: Final = 8_000
 
 
 class Beego(WheeledBase):
-    """Sends two drives their velocity in rpm of the motor, and reads their positions in counts.
+    """A robot that sends two drives motor velocities in rpm, and reads their positions in counts.
 
     The maker's dimensions of the robot are not available. The dimensions in the configuration are
     those of `examples/rigs/beego.toml`.
 
     Attributes:
-        speeds: OutPorts `left_speed`, `right_speed`, for 60FFh.
-        positions: InPorts `left_position`, `right_position`, of 6064h.
+        speeds: OutPorts `left_speed` and `right_speed`, for 60FFh.
+        positions: InPorts `left_position` and `right_position`, for 6064h.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Beego", "Base on two EPOS", category="RTC-CANopen")
@@ -187,11 +187,11 @@ class Beego(WheeledBase):
 
     @property
     def fastest(self) -> float:
-        """The highest wheel speed that can be commanded, rad/s."""
+        """The highest wheel speed that can be commanded, in rad/s."""
         return _FASTEST_RPM / 60 * tau / self.gear.value
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at zero, wherever the drives are."""
+        """Begin at zero, whatever the positions of the drives are."""
         self._counts = [None, None]
         for port in self.positions:
             port.clear()
@@ -203,7 +203,7 @@ class Beego(WheeledBase):
             port.write(rtc.TimedLong(tm, round(speed * self.gear.value * 60 / tau)))
 
     def turned(self, since_s: float) -> tuple[float, float]:
-        """Return how far the positions have moved."""
+        """Return the change of the positions."""
         left, right = (self._moved(side) for side in (0, 1))
         return left, right
 
@@ -223,17 +223,19 @@ WHEELS: Final = ("fl", "rl", "fr", "rr")
 """Front and rear left, front and rear right."""
 
 _FULL: Final = 32_767
-"""What stands for the full scale, 2010h:02."""
+"""Value for the full scale, 2010h:02."""
 
 
 class FourX(WheeledBase):
-    """Steers like a tank, in velocity mode; the pose is integrated from measured speeds.
+    """A robot that steers like a tank, in velocity mode.
+
+    Its pose is integrated from measured speeds.
 
     If no new speed arrives, the last one is used.
 
     Attributes:
         references: OutPorts `fl_reference` and so on, for 6411h:01.
-        speeds: InPorts `fl_speed` and so on, of 6401h:02.
+        speeds: InPorts `fl_speed` and so on, for 6401h:02.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("FourX", "Base on four wheels", category="RTC-CANopen")
@@ -251,11 +253,11 @@ class FourX(WheeledBase):
 
     @property
     def fastest(self) -> float:
-        """The highest wheel speed that can be commanded, rad/s."""
+        """The highest wheel speed that can be commanded, in rad/s."""
         return radians(self.full_scale.value)
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at zero, standing."""
+        """Begin at zero, with wheels at rest."""
         self._latest = [0.0] * len(WHEELS)
         for port in self.speeds:
             port.clear()
@@ -267,7 +269,7 @@ class FourX(WheeledBase):
             port.write(rtc.TimedShort(tm, round(speed / self.fastest * _FULL)))
 
     def turned(self, since_s: float) -> tuple[float, float]:
-        """Return how far the wheels turned at the speeds that were measured last, in the mean."""
+        """Return the mean rotation of the wheels at the speeds that were measured last."""
         for place, port in enumerate(self.speeds):
             if (speed := read_newest(port)) is not None:
                 self._latest[place] = speed.data / _FULL * self.fastest

@@ -1,4 +1,4 @@
-"""Run a server on a link: a rig in virtual time, or a real bus."""
+"""Running a server on a link, which is a rig in virtual time, or a real bus."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ def serve(
 
 
 class ServerRunner:
-    """Runs a server on a link until `stop` is called.
+    """A runner that runs a server on a link until `stop` is called.
 
     Args:
-        server: the server.
-        link: the bus.
+        server: server to run.
+        link: connection to the bus.
 
     Attributes:
-        running: False once `stop` was called.
+        running: whether the server runs, which is False once `stop` was called.
         late_ticks: number of ticks that began more than 1 ms late.
-        worst_late_us: the largest delay of a tick, us.
-        after_tick: called with the time after each tick.
-        serve: called between the ticks, at least every `pause_us`, with the time in us that it may
-            take; it can serve a control socket, for example.
-        pause_us: 20 ms; the longest time that a served client waits.
+        worst_late_us: largest delay of a tick in us.
+        after_tick: function that is called with the time after each tick.
+        serve: function that is called between the ticks, at least every `pause_us`, with the time
+            in us that it may take. It can serve a control socket, for example.
+        pause_us: longest time that a served client waits, 20 ms.
     """
 
     def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
@@ -80,7 +80,7 @@ class ServerRunner:
 
 
 def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
-    """Wait for frames or the next due time, tick the server, send; return the delay, us."""
+    """Wait for frames or the next due time, tick the server, and send. Return the delay in us."""
     due_us = min(server.due_us, until_us)
     now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
     if sent := server.tick(now_us, received):
@@ -89,11 +89,11 @@ def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
 
 
 def open_server(path: Path) -> RtcCanopenServer:
-    """Make a server of a System Definition and the EDS files beside it.
+    """Make a server from a System Definition and the EDS files beside it.
 
     Raises:
         OSError: the definition cannot be read.
-        DefinitionError: the definition or an EDS cannot be used; the error has the line and the
+        DefinitionError: the definition or an EDS cannot be used. The error has the line and the
             reason.
     """
     definition = read_definition(path)
@@ -101,7 +101,7 @@ def open_server(path: Path) -> RtcCanopenServer:
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
-    """Read the EDS files of a definition, each once.
+    """Read the EDS files of a definition. Each file is read once.
 
     Raises:
         DefinitionError: a file cannot be used, or lacks a PDO that the definition names.

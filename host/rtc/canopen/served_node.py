@@ -1,4 +1,4 @@
-"""One node as the server sees it: absent, booting, ready, gone."""
+"""One node as the server sees it, which is absent, booting, ready or gone."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from tickrig.wire.instant import NEVER
 # Find out that two nodes have one node-ID, by what they differ in.
 
 _NEARER: Final = 4
-"""So many times nearer to one time than to the other is a heartbeat that belongs to it."""
+"""Ratio of distances to two times above which a heartbeat belongs to the nearer time."""
 
 _STEADY: Final = 10
-"""A heartbeat is in time within the producer time divided by this number."""
+"""Divisor of the producer time. A heartbeat within this part of it is in time."""
 
 _APART: Final = 100
-"""Times that differ by less than the producer time divided by this number are equal."""
+"""Divisor of the producer time. Times that differ by less than this part are equal."""
 
 CROWDED: Final = 10
-"""Two heartbeats in each of this many producer times mean two nodes, or a changed 1017h."""
+"""Number of producer times with two heartbeats each that prove two nodes, or a changed 1017h."""
 
 _CREDIT: Final = 3
 """Number of recent commands kept for a state that a node has not reported yet."""
@@ -42,7 +42,7 @@ _IDENTITY: Final = frozenset({0x1000, 0x1018})
 
 
 class DuplicateNodeDetector:
-    """Monitors the frames of a node-ID, by the time stamps of the bus.
+    """A detector that monitors the frames of a node-ID by the time stamps of the bus.
 
     Two nodes with one node-ID are detected by frames that a single node cannot send:
 
@@ -56,13 +56,13 @@ class DuplicateNodeDetector:
     Not detected: nodes that send identical frames at identical times.
 
     Args:
-        period_us: producer heartbeat time.
+        period_us: producer heartbeat time of the node.
 
     Attributes:
-        sure_us: the time from which a booted node is known to be the only one, unless there was
+        sure_us: time from which a booted node is known to be the only one, unless there was
             evidence for a second node before.
-        sign: the evidence for two nodes; empty if there is none.
-        suspicion: the suspicion of two nodes; empty if there is none.
+        sign: evidence for two nodes, empty if there is none.
+        suspicion: suspicion of two nodes, empty if there is none.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -74,7 +74,7 @@ class DuplicateNodeDetector:
         self.forget()
 
     def forget(self) -> None:
-        """Restart the detection: frames may have been missed, or the producer time was written."""
+        """Restart the detection, after frames may be missing or the producer time was written."""
         self._old_us, self._steady = 0, False
         self._clear()
 
@@ -106,8 +106,8 @@ class DuplicateNodeDetector:
         """Process a boot-up or heartbeat.
 
         Args:
-            at_us: when the frame was on the bus.
-            state: the state in the frame.
+            at_us: time of the frame on the bus.
+            state: state in the frame.
             listening: whether nothing was sent to the node since it booted.
         """
         before, self._state = self._state, state
@@ -127,7 +127,7 @@ class DuplicateNodeDetector:
             self.suspicion = f"two heartbeats in each {self._period_us // 1_000} ms"
 
     def _judge_state(self, at_us: int, before: NmtState | None, state: NmtState) -> None:
-        """See whether a node alone can be there now."""
+        """Check whether a single node can be in this state now."""
         if state is before:
             return
         commanded = self._commanded[state] > 0
@@ -139,7 +139,7 @@ class DuplicateNodeDetector:
         self._doubt_us = at_us
 
     def _judge_time(self, at_us: int) -> None:
-        """See whether a heartbeat is one of before the boot-up."""
+        """Check whether a heartbeat continues the times from before the boot-up."""
         if not self._steady:  # it was held up: its times say nothing
             return
         old_us, new_us = self._off_us(at_us - self._old_us), self._off_us(at_us - self._booted_us)
@@ -150,20 +150,20 @@ class DuplicateNodeDetector:
             self.sign = "a boot-up, and heartbeats at the times of before"
 
     def _off_us(self, span_us: int) -> int:
-        """Return by how much a time is not one of whole periods."""
+        """Return the distance of a time from the nearest multiple of the period."""
         over_us = span_us % self._period_us
         return min(over_us, self._period_us - over_us)
 
 
 class _DoubleHeartbeats:
-    """Says when two heartbeats came in each of many producer times on end."""
+    """A detector for two heartbeats in each of many successive producer times."""
 
     def __init__(self, period_us: int) -> None:
         self._period_us, self._begin_us = period_us, -1
         self._window = self._count = self._run = 0
 
     def receive(self, at_us: int) -> bool:
-        """Take a heartbeat; True if there are too many."""
+        """Process a heartbeat. Return True if there are too many heartbeats."""
         if self._begin_us < 0:
             self._begin_us = at_us - self._period_us // 2
         window = (at_us - self._begin_us) // self._period_us
@@ -176,20 +176,20 @@ class _DoubleHeartbeats:
 
 
 def _goes_by_itself(before: NmtState | None, state: NmtState) -> bool:
-    """Return whether a node may enter a state by itself (CiA 301: 1029h, after its boot-up)."""
+    """Return whether a node may enter a state without a command (CiA 301: 1029h, after boot-up)."""
     if before in (None, NmtState.INITIALISING) or state is NmtState.STOPPED:
         return True
     return before is NmtState.OPERATIONAL
 
 
 _FOREIGN_RESET_US: Final = 1_000_000
-"""A boot-up so soon after another master's reset is its doing."""
+"""Time after another master's reset in which a boot-up is caused by that reset."""
 
 _RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 
 
 class NodePhase(Enum):
-    """How far a node has come."""
+    """Phase of the set-up of a node."""
 
     ABSENT = "absent"
     LISTENING = "listening"  # it booted though it was there: itself, or another of its node-ID
@@ -201,43 +201,43 @@ class NodePhase(Enum):
 
 _READY: Final = NodePhase.READY
 _LISTENING: Final = NodePhase.LISTENING
-"""Looked up once: it takes 0.1 us, and each node asks in each period."""
+"""Value that is looked up once, because a look-up takes 0.1 us for each node in each period."""
 
 _WATCHED: Final = (NodePhase.READY, NodePhase.DUPLICATE)
-"""Phases in which heartbeats are awaited."""
+"""Phases in which the server expects heartbeats."""
 
 _LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
-"""Phases in which the server looks for a twin."""
+"""Phases in which the server looks for a second node with the same node-ID."""
 
 
 class NodeServer(Protocol):
-    """What a node needs of its server."""
+    """The services of the server that a node needs."""
 
     def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
-        """Take an event."""
+        """Record an event."""
 
     def send(self, can_id: int, data: bytes, /) -> None:
         """Send a frame."""
 
     def wake(self, due_us: int, /) -> None:
-        """Let the node be ticked at a time."""
+        """Schedule a tick of the node at a time."""
 
     def booted(self, node: ServedNode, /) -> None:
-        """Make the proxy if there is none, links and connections."""
+        """Make the proxy if there is none, and the links and connections of the node."""
 
     def gone(self, node: ServedNode, /) -> None:
         """Remove the proxy."""
 
 
 class ServedNode:
-    """A node: detects when it boots or is lost, sets it up, keeps it and its proxy in step.
+    """A node, which is detected and set up, and whose proxy follows its state.
 
     Args:
-        entry: its entry in the System Definition.
-        file: the content of its EDS.
-        writes: values that are written while it boots.
-        remove_us: time without a heartbeat after which its proxy is removed.
-        server: the server.
+        entry: entry of the node in the System Definition.
+        file: content of the node's EDS.
+        writes: values that are written while the node boots.
+        remove_us: time without a heartbeat after which the proxy is removed.
+        server: server of the node.
 
     Attributes:
         entry, file, writes: as given.
@@ -274,16 +274,16 @@ class ServedNode:
 
     @property
     def proxy(self) -> ProxyRtc | None:
-        """Its RT component, None without."""
+        """RT component of the node, or None without a proxy."""
         return self.operations.proxy
 
     @property
     def nmt_state(self) -> NmtState | None:
-        """What it reported last, None before."""
+        """Last reported NMT state, or None before the first report."""
         return self.operations.nmt_state
 
     def search(self, now_us: int) -> None:
-        """Look for it on the bus."""
+        """Look for the node on the bus."""
         self.operations.now_us = now_us
         self.phase, self.lost = NodePhase.ABSENT, False
         self._duplicates.forget()
@@ -292,7 +292,7 @@ class ServedNode:
         self._plan()
 
     def boot(self, now_us: int) -> None:
-        """Set it up, from whatever it is in."""
+        """Set up the node from any state."""
         self.operations.now_us = now_us
         self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._plan()
@@ -300,8 +300,8 @@ class ServedNode:
     def restart(self, now_us: int) -> None:
         """Reset the node from any state, on request of a user.
 
-        Its proxy is removed. The node is set up when it boots. It is activated again if it was
-        Active, or was lost while it was Active.
+        The proxy is removed. The node is set up when it boots. The node is activated again if it
+        was Active, or was lost while it was Active.
         """
         operations = self.operations
         operations.now_us = now_us
@@ -317,18 +317,18 @@ class ServedNode:
         self.search(now_us)
 
     def refuse(self, problem: str) -> None:
-        """Leave it as it is until it boots again."""
+        """Leave the node as it is until it boots again."""
         self.phase, self.problem = NodePhase.REFUSED, problem
 
     def pause(self, now_us: int, span_us: int) -> None:
-        """Record that no frames were received for some time: the node may have sent some."""
+        """Record that frames may be missing, because none were received for some time."""
         self._watched_us, self._blind_us = now_us, self._blind_us + span_us
         self.dialogue.defer(span_us)
         self._duplicates.forget()
         self._plan()
 
     def on_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
-        """Process a boot-up or heartbeat with its time on the bus; ignore other frames."""
+        """Process a boot-up or heartbeat with its time on the bus. Ignore other frames."""
         try:
             (number,) = data
             state = NmtState(number)
@@ -343,7 +343,7 @@ class ServedNode:
         self._plan()
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
-        """Take an SDO response."""
+        """Process an SDO response."""
         self.operations.now_us = now_us
         self._duplicates.answer(data)
         self.dialogue.receive_sdo(now_us, data)
@@ -351,7 +351,7 @@ class ServedNode:
         self._plan()
 
     def on_foreign_command(self, at_us: int, command: int) -> None:
-        """Take an NMT command of another master."""
+        """Process an NMT command of another master."""
         self._duplicates.command(command)
         if command in _RESETS:
             self._foreign_reset_us = at_us
@@ -363,7 +363,7 @@ class ServedNode:
         self._plan()
 
     def tick(self, now_us: int) -> None:
-        """Do what is due."""
+        """Do the work that is due."""
         self.operations.now_us = now_us
         self.dialogue.tick(now_us)
         if self.phase is NodePhase.LISTENING and now_us >= self._duplicates.sure_us:
@@ -385,7 +385,7 @@ class ServedNode:
 
     @property
     def _deadline_us(self) -> int:
-        """When its heartbeat is late, or its proxy is to be removed."""
+        """Time at which the heartbeat is late, or at which the proxy is removed."""
         if self.phase not in _WATCHED:
             return NEVER
         since_us = max(self.received_us, self._watched_us)
@@ -405,7 +405,7 @@ class ServedNode:
             self._server.wake(due_us)
 
     def _take(self, state: NmtState, *, changed: bool) -> None:
-        """See to a state that was reported just now."""
+        """Process a state that was reported just now."""
         self._duplicates.receive(
             self.received_us, state, listening=self.phase is NodePhase.LISTENING
         )
@@ -432,7 +432,7 @@ class ServedNode:
             self._boot()
 
     def _found(self) -> None:
-        """Set it up although its boot-up was not received; a Stopped node does not answer SDO."""
+        """Set up the node although its boot-up was missed. A Stopped node does not answer SDO."""
         if self.nmt_state is NmtState.STOPPED:
             self.dialogue.clear()
             self.operations.say(NmtCommand.RESET_NODE)
@@ -474,7 +474,7 @@ class ServedNode:
             self.phase = NodePhase.REFUSED
 
     def _judge(self) -> bool:
-        """Check for a twin: then stop both; report a suspicion once."""
+        """Check for a second node. If there is one, stop both nodes. Report a suspicion once."""
         duplicates = self._duplicates
         if duplicates.sign and self.phase in _LIVING:
             self._refuse_duplicate(duplicates.sign)

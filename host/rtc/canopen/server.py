@@ -1,4 +1,4 @@
-"""The RTC-CANopen server: NMT master, heartbeat consumer, maker of proxies (Fig. 108)."""
+"""The RTC-CANopen server: NMT master, heartbeat consumer, and maker of proxies (Fig. 108)."""
 
 # Theory of operation
 #
@@ -65,13 +65,13 @@ from tickrig.wire.rtc_types.idl import Struct
 # The frames that the server receives besides PDOs, and their receivers.
 
 _DEVICE_TYPE: Final = 460
-"""A marker of ours: the number of the profile whose text is not public."""
+"""Device profile number of the server. We use a number whose profile text is not public."""
 
 _CONSUMERS: Final = 3
-"""A heartbeat may be late by this many producer times."""
+"""Number of producer times by which a heartbeat may be late."""
 
 _SYNC_COB_ID: Final = 0x080
-"""The default of 1005h (CiA 301, SYNC)."""
+"""Default of 1005h (CiA 301, SYNC)."""
 
 _MOST_MS: Final = 0xFFFF
 
@@ -79,7 +79,7 @@ _Table = Mapping[tuple[int, int], bytes]
 
 
 class ServerObjects:
-    """Answers SDO reads of the server's own objects.
+    """The server's own objects, and its answers to SDO reads of them.
 
     | object | what |
     |---|---|
@@ -90,7 +90,7 @@ class ServerObjects:
     | 1017h | producer heartbeat time |
     | 1018h | identity: vendor-ID 0, which is not assigned |
 
-    Not emulated: writing, segments and blocks; every object has at most four bytes.
+    Not emulated: writing, segments and blocks. Every object has at most four bytes.
 
     Args:
         definition: settings of the server.
@@ -114,7 +114,7 @@ class ServerObjects:
         self._indices = frozenset(index for index, _ in self._table)
 
     def answer(self, data: bytes) -> bytes | None:
-        """Return the answer to a request; None to an abort, and to any other frame."""
+        """Return the answer to a request, or None for an abort and for any other frame."""
         try:
             request = sdo.parse_request(data)
         except WireError:
@@ -156,19 +156,19 @@ def _u32(value: int) -> bytes:
 _EMERGENCY: Final = range(0x080, 0x100)
 _SDO_RESPONSES: Final = range(0x580, 0x600)
 _ERROR_CONTROL: Final = range(0x700, 0x780)
-"""What nodes send, by node-ID; node 0 is none."""
+"""CAN-IDs of error control by node-ID. Node 0 does not exist."""
 
 _QUIET_US: Final = 1_000_000
-"""After this time without frames, another master is reported again."""
+"""Time without frames after which another master is reported again."""
 
 
 class _FrameDispatcher:
-    """Passes frames to their nodes, and logs those of other nodes.
+    """A dispatcher that passes frames to their nodes, and logs frames of other nodes.
 
     Args:
-        nodes: by node-ID.
+        nodes: nodes by node-ID.
         definition: settings of the server.
-        server: the server.
+        server: server of the nodes.
     """
 
     def __init__(
@@ -183,7 +183,7 @@ class _FrameDispatcher:
         self._accepted = frozenset({nmt.NMT_COB_ID} | of_master | of_nodes)
 
     def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
-        """Take a data frame that was on the bus at a time."""
+        """Process a data frame that was on the bus at a time."""
         can_id = frame.can_id
         if can_id not in self._accepted:
             return
@@ -240,32 +240,34 @@ class _FrameDispatcher:
 
 
 _LATE_US: Final = 100_000
-"""A server that ticks this much later than planned does not know what the nodes sent."""
+"""Delay of a tick from which the server does not know what the nodes sent."""
 
 
 class RtcCanopenServer:
-    """Runs the nodes of a System Definition; without a clock or bus, driven by `tick`.
+    """A server for the nodes of a System Definition.
+
+    The server has no clock and no bus. It is driven by `tick`.
 
     Like the `tick` of a device, `tick` takes the time and the received frames, and returns the
-    frames to send. So the same server runs in virtual time on a rig, and on a real bus.
+    frames to send. Therefore the same server runs in virtual time on a rig, and on a real bus.
 
-    Not emulated: flying master, TIME, program download, a CANopen node for
-    each proxy on the bus.
+    Not emulated: flying master, TIME, program download, and a CANopen node for each proxy on the
+    bus.
 
     Args:
-        definition: the System Definition.
-        files: contents of the EDS files, by their names in the definition.
-        manager: holds the proxies and all other components; by default a new one.
+        definition: System Definition to serve.
+        files: content of the EDS files by name in the definition.
+        manager: manager of the proxies and all other components. By default, it is a new manager.
 
     Attributes:
-        manager: as given.
-        nodes: by node-ID.
-        log: the events.
-        connections: connectors through the PC.
-        links: PDO links.
-        findings: the findings in the EDS files.
+        manager: manager of the proxies and all other components.
+        nodes: nodes by node-ID.
+        log: log of the events.
+        connections: connectors of ports through the PC.
+        links: PDO links between nodes.
+        findings: findings in the EDS files.
         now_us: time of the last tick.
-        due_us: when to call `tick` next.
+        due_us: time of the next call of `tick`.
     """
 
     def __init__(
@@ -293,7 +295,10 @@ class RtcCanopenServer:
         self._states: dict[int, LifeCycleState] = {}
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Take all that was on the bus by now; do what is due; return what is to be sent."""
+        """Process all frames that were on the bus by now.
+
+        Do the due work. Return frames to send.
+        """
         late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
             self._start()
@@ -326,7 +331,7 @@ class RtcCanopenServer:
         return out
 
     def stop(self, now_us: int) -> Frames:
-        """End all proxies, and leave the nodes as the definition says (K14, finalize)."""
+        """End all proxies, and leave the nodes as the definition requires (K14, finalize)."""
         self.now_us = now_us
         for node in self.nodes.values():
             node.dialogue.clear()
@@ -338,7 +343,7 @@ class RtcCanopenServer:
         return out
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Process a report of the CAN controller; the next tick handles it."""
+        """Record a report of the CAN controller. The next tick processes it."""
         self._bus_states.append(state)
         self.due_us = self.now_us
 
@@ -361,7 +366,7 @@ class RtcCanopenServer:
             node.to_start = True
 
     def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
-        """Take an event."""
+        """Record an event."""
         self.log.notify(self.now_us, kind, node, text)
 
     def send(self, can_id: int, data: bytes, /) -> None:
@@ -374,7 +379,7 @@ class RtcCanopenServer:
         self.due_us = min(self.due_us, due_us)
 
     def booted(self, node: ServedNode, /) -> None:
-        """Make the proxy of a node that has booted, its links and connections."""
+        """Make the proxy of a node that has booted, with its links and connections."""
         try:
             self._make_proxy(node)
         except RtcRefused as error:  # its name, or that of a port, is there twice
@@ -413,7 +418,7 @@ class RtcCanopenServer:
             node.search(self.now_us)
 
     def _be_late(self, late_us: int) -> None:
-        """Report the delay, at most once a second, and do not count nodes as lost in that time."""
+        """Report the delay at most once a second. Nodes do not count as lost in that time."""
         self._late_us = max(self._late_us, late_us)
         for node in self.nodes.values():
             node.pause(self.now_us, late_us)
@@ -438,7 +443,7 @@ class RtcCanopenServer:
         self._data.watch(node)
 
     def _on_bus_states(self) -> None:
-        """See to what the CAN controller reported: bus-off leaves all proxies in Error."""
+        """Process reports of the CAN controller. Bus-off leaves all proxies in Error."""
         states, self._bus_states = self._bus_states, []
         for state in states:
             if state is ErrorState.BUS_OFF:
@@ -462,7 +467,7 @@ class RtcCanopenServer:
                 self._notify_state(node, node.proxy)
 
     def _activate_next(self) -> None:
-        """Activate the next node of the start order, if it is to start and is ready."""
+        """Activate the next node of the start order, if it should start and is ready."""
         for node in self._start_order:
             if node.proxy is None or not node.proxy.confirmed:
                 if node.to_start and node.phase is NodePhase.READY and node.proxy is not None:

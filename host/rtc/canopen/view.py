@@ -1,4 +1,4 @@
-"""A running server as tools see it: what is there, and what can be done."""
+"""A running server as tools see it, with its state and its commands."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class PortView:
     """A port of a proxy.
 
     Attributes:
-        name: full name, such as `Palette0.ai`.
-        data_type: name of its type, such as `TimedShort`.
-        out: whether it is an OutPort.
-        peers: full names of the ports that it is connected with.
-        pdo: the PDO that carries its values; None if no PDO does.
+        name: full name of the port, such as `Palette0.ai`.
+        data_type: name of the data type, such as `TimedShort`.
+        out: whether the port is an OutPort.
+        peers: full names of the connected ports.
+        pdo: PDO that carries the values of the port, or None if no PDO does.
     """
 
     name: str
@@ -54,11 +54,11 @@ class PdoView:
     """An enabled PDO of a device.
 
     Attributes:
-        name: such as `16.tpdo2`.
-        cob_id: its CAN-ID; for a linked RPDO the CAN-ID of the source.
-        bits: its length in bits.
-        index: index of its communication parameter in the device.
-        proxy_index: index of this parameter in the proxy.
+        name: name of the PDO, such as `16.tpdo2`.
+        cob_id: CAN-ID of the PDO. For a linked RPDO, it is the CAN-ID of the source.
+        bits: length of the PDO in bits.
+        index: index of the communication parameter in the device.
+        proxy_index: index of the communication parameter in the proxy.
     """
 
     name: PdoName
@@ -73,11 +73,11 @@ class NodeView:
     """A node and its proxy.
 
     Attributes:
-        nmt_state: such as `OPERATIONAL`; empty before its first frame.
-        heartbeat_age_us: time since its last frame; `NOT_HEARD` before the first frame.
-        late: whether its heartbeat is missing.
-        proxy_state: such as `ACTIVE`; empty without a proxy.
-        problem: the reason why the node is refused; empty if it is not refused.
+        nmt_state: NMT state such as `OPERATIONAL`, empty before the first frame.
+        heartbeat_age_us: time since the last frame, or `NOT_HEARD` before the first frame.
+        late: whether the heartbeat of the node is missing.
+        proxy_state: state of the proxy such as `ACTIVE`, empty without a proxy.
+        problem: reason why the node is refused, empty if it is not refused.
     """
 
     node_id: int
@@ -98,7 +98,7 @@ class ComponentView:
     """A component that is not a proxy.
 
     Attributes:
-        state: its state, such as `ACTIVE`.
+        state: state of the component, such as `ACTIVE`.
     """
 
     name: str
@@ -109,7 +109,7 @@ class ComponentView:
 
 @dataclass(frozen=True, slots=True)
 class SystemView:
-    """All that there is, at one time; see the properties of `ServerView`."""
+    """All parts of a system at one time; see the properties of `ServerView`."""
 
     nodes: tuple[NodeView, ...]
     components: tuple[ComponentView, ...]
@@ -125,39 +125,41 @@ class PendingTransfer(Generic[_T]):
     """SDO transfers with a waiting caller.
 
     Args:
-        empty: the result until the transfers have ended.
+        empty: result until the transfers have ended.
 
     Attributes:
         done: whether the transfers have ended.
-        data: the values read; `empty` after a write.
-        problem: the reason for a failure; empty if the transfers did not fail.
+        data: values that were read, or `empty` after a write.
+        problem: reason for a failure, empty if the transfers did not fail.
     """
 
     def __init__(self, empty: _T) -> None:
         self.done, self.data, self.problem = False, empty, ""
 
     def succeed(self, data: _T | None) -> None:
-        """Take the result."""
+        """Store the result."""
         self.done = True
         if data is not None:
             self.data = data
 
     def fail(self, failure: Failure | str) -> None:
-        """Take what went wrong."""
+        """Store the error."""
         self.done, self.problem = True, str(failure)
 
     def drop(self) -> None:
-        """Take that the server had to do something else first."""
+        """Store that the server dropped the transfers for other work."""
         self.fail("given up: the node was reset, stopped or lost")
 
 
 class ServerView:
-    """Reads the state of a server and sends it commands, between its ticks and in its thread.
+    """A view that reads the state of a server and sends it commands.
 
-    Commands return at once; their results appear in the states and events.
+    Use the view between the ticks of the server and in its thread.
+
+    Commands return at once. Their results appear in the states and events.
 
     Args:
-        server: the server.
+        server: server to view.
     """
 
     def __init__(self, server: RtcCanopenServer) -> None:
@@ -170,49 +172,52 @@ class ServerView:
 
     @property
     def system(self) -> SystemView:
-        """All that there is."""
+        """All parts of the system."""
         return SystemView(self.nodes, self.components, self.links, self.connections, self.waiting)
 
     @property
     def components(self) -> tuple[ComponentView, ...]:
-        """All components that are no proxies."""
+        """All components that are not proxies."""
         components = self._server.manager.components
         return tuple(_component(one) for one in components if not isinstance(one, ProxyRtc))
 
     @property
     def events(self) -> tuple[ServerEvent, ...]:
-        """What happened, the latest last."""
+        """The events of the server. The latest event is last."""
         return self._server.log.events
 
     @property
     def links(self) -> tuple[PdoLink, ...]:
-        """PDO links that are wanted."""
+        """The wanted PDO links."""
         return tuple(self._server.links.links)
 
     @property
     def connections(self) -> tuple[RtConnection, ...]:
-        """Connections through the PC, those that are made first."""
+        """Connections through the PC. The made connections are first."""
         return self._server.connections.all
 
     @property
     def waiting(self) -> tuple[RtConnection, ...]:
-        """Connections whose ports are not there yet."""
+        """Connections whose ports do not exist yet."""
         return tuple(self._server.connections.wanted)
 
     def node(self, node_id: int) -> NodeView:
-        """Return one node; ServerRefused if there is none."""
+        """Return one node. Raise ServerRefused if there is no such node."""
         return self._view(self._node(node_id))
 
     def activate(self, name: str) -> None:
-        """Ask for Active; RtcRefused if the proxy or component cannot."""
+        """Request Active. Raise RtcRefused if this is impossible for the proxy or component."""
         self._server.manager.activate(name)
 
     def deactivate(self, name: str) -> None:
-        """Ask for Inactive; RtcRefused if the proxy or component cannot."""
+        """Request Inactive. Raise RtcRefused if this is impossible for the proxy or component."""
         self._server.manager.deactivate(name)
 
     def reset(self, name: str) -> None:
-        """Ask for Error to Inactive; RtcRefused if the proxy or component cannot."""
+        """Request Inactive from Error.
+
+        Raise RtcRefused if the proxy or component cannot do this.
+        """
         self._server.manager.reset(name)
 
     def start(self) -> None:
@@ -220,40 +225,40 @@ class ServerView:
         self._server.start()
 
     def boot(self, node_id: int) -> None:
-        """Set up a node again, also a refused one; it gets a new proxy."""
+        """Set up a node again, even a refused node. The node gets a new proxy."""
         self._node(node_id).boot(self._server.now_us)
 
     def restart(self, node_id: int) -> None:
-        """Reset a node by NMT, one that was lost, too; it is Active again if it was."""
+        """Reset a node by NMT, even a lost one. It becomes Active again if it was Active."""
         self._node(node_id).restart(self._server.now_us)
 
     def connect(self, first: str, second: str, properties: Mapping[str, str] | None = None) -> None:
-        """Join two ports through the PC; RtcRefused if they do not fit."""
+        """Connect two ports through the PC. Raise RtcRefused if they do not fit."""
         self._server.manager.connect(first, second, properties)
 
     def disconnect(self, first: str, second: str) -> None:
-        """End such a connection, one that waits for its ports, too; RtcRefused if there is none."""
+        """End a made or waiting connection through the PC. Raise RtcRefused if there is none."""
         if not self._server.connections.forget(first, second):
             self._server.manager.disconnect(first, second)
 
     def link(self, source: PdoName, target: PdoName) -> None:
-        """Let an RPDO receive a TPDO without the PC; ServerRefused if they do not fit."""
+        """Let an RPDO receive a TPDO without the PC. Raise ServerRefused if they do not fit."""
         self._server.links.add(self._server.now_us, PdoLink(source, target))
 
     def unlink(self, source: PdoName, target: PdoName) -> None:
-        """End such a link; ServerRefused if there is none."""
+        """End a link of an RPDO with a TPDO. Raise ServerRefused if there is none."""
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
     def read(self, node_id: int, index: int, sub: int) -> PendingTransfer[bytes]:
-        """Read an object of a device; ServerRefused if there is no such node."""
+        """Read an object of a device. Raise ServerRefused if there is no such node."""
         return self._transfer(node_id, upload(index, sub), b"")
 
     def write(self, node_id: int, index: int, sub: int, data: bytes) -> PendingTransfer[bytes]:
-        """Write an object of a device; ServerRefused if there is no such node."""
+        """Write an object of a device. Raise ServerRefused if there is no such node."""
         return self._transfer(node_id, download(index, sub, data), b"")
 
     def read_pdos(self, node_id: int) -> PendingTransfer[pdo_edit.Pdos]:
-        """Read all PDOs of a device; ServerRefused if it does not answer now."""
+        """Read all PDOs of a device. Raise ServerRefused if the device does not answer now."""
         node = self._node(node_id)
         pdo_edit.check_answers(node)
         return self._transfer(node_id, pdo_edit.read_pdos(node.file), {})
@@ -261,11 +266,13 @@ class ServerView:
     def write_pdos(
         self, node_id: int, before: pdo_edit.Pdos, wanted: pdo_edit.Pdos
     ) -> PendingTransfer[None]:
-        """Change PDOs of a device, and set it up again; ServerRefused if that is not possible now.
+        """Change PDOs of a device, and set up the device again.
+
+        Raises ServerRefused if that is not possible now.
 
         Args:
-            node_id: the node.
-            before: the PDOs that the node has.
+            node_id: node-ID of the node.
+            before: PDOs that the node has.
             wanted: the new descriptions of some of these PDOs.
         """
         node, transfer = self._node(node_id), PendingTransfer(None)
@@ -289,16 +296,19 @@ class ServerView:
         return transfer
 
     def read_parameters(self, node_id: int, eds: Path) -> PendingTransfer[Mapping[int, bytes]]:
-        """Read what a DCF contains of a device; ServerRefused if it does not answer now."""
+        """Read the DCF values of a device.
+
+        Raise ServerRefused if the device does not answer now.
+        """
         pdo_edit.check_answers(self._node(node_id))
         return self._transfer(node_id, pdo_edit.read_parameters(eds), {})
 
     def device_file(self, node_id: int) -> DeviceFile:
-        """Return what the EDS of a node says; ServerRefused if there is no such node."""
+        """Return the content of a node's EDS. Raise ServerRefused if there is no such node."""
         return self._node(node_id).file
 
     def definition(self) -> SystemDefinition:
-        """Return the definition with PDOs, connections and links as they are now."""
+        """Return the definition with the present PDOs, connections and links."""
         return replace(
             self._server.definition,
             nodes=tuple(node.entry for node in self._server.nodes.values()),
@@ -345,7 +355,7 @@ def _component(component: RtComponent) -> ComponentView:
 
 
 def _ports(component: RtComponent) -> tuple[PortView, ...]:
-    """Return the data ports; service ports cannot be joined with those of a device."""
+    """Return the data ports. Service ports cannot be connected with ports of a device."""
     pdos = dict[str, PdoName]()
     if isinstance(component, ProxyRtc):
         carriers: tuple[PdoSource | PdoSink, ...] = (*component.sources, *component.sinks)

@@ -1,4 +1,4 @@
-"""The terminal of a system: components take typed lines, and what they tell is shown."""
+"""The terminal of a system, which sends typed lines to components and shows their output."""
 
 from __future__ import annotations
 
@@ -19,31 +19,32 @@ _READ_BYTES: Final = 4_096
 
 
 class _TypedTo(Protocol):
-    """A component to which lines are typed, as ConsoleIn and PositionInput."""
+    """A component that accepts typed lines, such as ConsoleIn and PositionInput."""
 
     def typed(self, line: str) -> None:
-        """Take a line; ValueError if it is none for this component, which is not changed."""
+        """Process a line. Raise ValueError without a change if the line is invalid."""
 
 
 def _is_typed_to(component: object) -> TypeGuard[_TypedTo]:
-    """Return whether lines are typed to a component."""
+    """Return whether a component accepts typed lines."""
     return hasattr(component, "typed")
 
 
 class Console:
-    """Shows the output of components, such as `ConsoleOut0 5` or `PositionInput0 FINISH`.
+    """A console that shows the output of components, such as `ConsoleOut0 5`.
 
-    A typed line goes to each component that accepts it. If no component does, the console prints
-    the reason. A component may have the attributes `report` and `prompt`. The console sets `report`
-    to a function that shows a line, and `prompt` to one that shows a line only to people.
+    A typed line goes to each component that accepts it. If no component accepts the line, the
+    console prints the reason. A component may have the attributes `report` and `prompt`. The
+    console sets `report` to a function that shows a line, and `prompt` to a function that shows a
+    line only on a terminal.
 
     Args:
-        manager: has the components.
-        show: prints a line.
-        warn: prints a line that is only for people.
+        manager: manager with the components.
+        show: function that prints a line.
+        warn: function that prints a line that is only for the user.
 
     Attributes:
-        is_open: whether more may be typed; False once the standard input ends.
+        is_open: whether more lines may be typed, which is False once the standard input ends.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Console:
                     setattr(component, attribute, partial(_prefixed, printed, name))
 
     def read(self, descriptor: int) -> None:
-        """Take lines that were typed; never wait."""
+        """Read the lines that were typed. Never wait."""
         if self.is_open and ready([descriptor], wait_s=0)[0] and _in_foreground(descriptor):
             data = os.read(descriptor, _READ_BYTES)
             self.is_open = bool(data)
@@ -89,7 +90,10 @@ def _prefixed(printed: Callable[[str], None], name: str, text: str) -> None:
 
 
 def _in_foreground(descriptor: int) -> bool:
-    """Return whether this process may read there: a terminal stops one in its background."""
+    """Return whether this process may read there.
+
+    A terminal stops a background process that reads.
+    """
     if sys.platform != "win32":
         with suppress(OSError):  # a terminal that does not control this process
             return not os.isatty(descriptor) or os.tcgetpgrp(descriptor) == os.getpgrp()

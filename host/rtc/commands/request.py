@@ -1,4 +1,4 @@
-"""Ask a running system: its control socket, names to complete, waiting for a state."""
+"""Requests to a running system: its control socket, names to complete, waiting for a state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ERROR: Final = "ERROR"
 
 
 def default_path() -> Path:
-    """Return the default address of a system: `tickrig-rtc`, in a folder of this user."""
+    """Return the default address of a system, which is `tickrig-rtc` in a folder of this user."""
     folder = os.environ.get("XDG_RUNTIME_DIR")
     if folder:
         return Path(folder, "tickrig-rtc")
@@ -43,16 +43,19 @@ at: Final[Decorator] = click.option(
     metavar="PATH",
     help=f"Control socket of the system; also from {VARIABLE}.",
 )
-"""Add `--at`, which all verbs have."""
+"""Decorator that adds `--at`, which all verbs have."""
 
 
 def request_system(socket: Path, do: str, /, **fields: object) -> Any:
-    """Ask a running system and return its answer; Refused if it gives none, or an error."""
+    """Ask a running system and return its answer.
+
+    Raise Refused without an answer, or for an error.
+    """
     return request(socket, SYSTEM, do, **fields)
 
 
 def components(socket: Path, *names: str) -> list[Any]:
-    """Return the descriptions of components, of all if none is named."""
+    """Return the descriptions of components, or of all components if no name is given."""
     fields: Object = {"names": list(names)} if names else {}
     described: list[Any] = request_system(socket, "describe", **fields)["components"]
     return described
@@ -62,7 +65,7 @@ _Complete = Callable[[click.Context, click.Parameter, str], list[str]]
 
 
 def _completer(names: Callable[[Any], list[str]]) -> _Complete:
-    """Return what completes a word by names out of the description of a running system."""
+    """Return a function that completes a word by names in the description of a running system."""
 
     def complete(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
         socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
@@ -86,14 +89,14 @@ def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
     """Wait until a component is in the wanted state.
 
     Args:
-        socket: control socket of its system.
-        name: the component.
-        wanted: name of a life-cycle state.
-        wait_us: how long to wait; 0 returns without waiting.
+        socket: control socket of the system.
+        name: name of the component.
+        wanted: name of the wanted life-cycle state.
+        wait_us: time to wait. 0 returns without waiting.
 
     Raises:
         Refused: the component or its system is gone.
-        click.ClickException: the component went to Error instead, or the time is over.
+        click.ClickException: the component moved to Error instead, or the time is over.
     """
     start_s = time.monotonic()
     while wait_us:
@@ -107,6 +110,6 @@ def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
 
 
 def _periods_us(component: Any) -> float:
-    """Return how long a move takes at most: two periods, and a moment for the way there."""
+    """Return the longest time of a move, which is two periods and a moment for transport."""
     rate_hz: float = component["contexts"][0]["rate_hz"]
     return 2e6 / rate_hz + 100_000

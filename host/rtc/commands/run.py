@@ -1,4 +1,4 @@
-"""Run a system of RT components in real time, as a command line asks."""
+"""Running a system of RT components in real time, as a command line requires."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from tickrig.host.rtc.system.system_file import check_system, file_format, read_
 from tickrig.host.text.user_file import explain_error, find_class
 
 _ATTACH_LITE: Final = "tickrig.host.rtc.lite.attachment:attach_lite"
-"""Named by its path, as a command is: that room is made of this one's components."""
+"""Function loaded by its path, as a command is, because that folder uses components of this one."""
 _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
-"""The same."""
+"""Function that is also loaded by its path."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _SystemOptions:
-    """The command line of `tickrig rtc run`."""
+    """The options of `tickrig rtc run`."""
 
     system: Path | None = None
     control: Path
@@ -69,7 +69,7 @@ def run_system(lite_boot: str, **given: Any) -> None:
 
 
 def _find_rt_component(spec: str) -> type[RtComponent]:
-    """Return the class that `FILE.py:Class` stands for; Refused if no component can be of it."""
+    """Return the class that `FILE.py:Class` names. Raise Refused if a component cannot be of it."""
     try:
         kind: type[RtComponent] = find_class(spec, RtComponent)
         kind(f"{kind.spec.type_name}0")
@@ -80,7 +80,7 @@ def _find_rt_component(spec: str) -> type[RtComponent]:
 
 
 def _restore(manager: Manager, system: System, options: _SystemOptions) -> None:
-    """Make the system; proxies are there already."""
+    """Make the system. The proxies exist already."""
     if (rate_hz := options.rate_hz) is not None:
         entries = tuple(replace(entry, rate_hz=rate_hz) for entry in system.components)
         system = replace(system, components=entries)
@@ -100,7 +100,7 @@ def _restore(manager: Manager, system: System, options: _SystemOptions) -> None:
 
 
 def _serve(stack: ExitStack, manager: Manager, options: _SystemOptions) -> None:
-    """Run until stopped, then save."""
+    """Run until the system is stopped, then save it."""
     clock = ServingClock()
     runner = RealTime(manager, clock)
     control = SystemControl(manager, runner)
@@ -133,7 +133,7 @@ def _run(manager: Manager, runner: RealTime, options: _SystemOptions) -> None:
 
 
 def _close(manager: Manager) -> None:
-    """Let no component be Active any more, and no device behind it."""
+    """Deactivate all components, and the devices behind them."""
     for component in manager.components:
         for context in tuple(component.contexts):
             context.close()

@@ -1,4 +1,4 @@
-"""What can be asked of a running system of RT components (docs/reference/rtc/rtc.md)."""
+"""The requests that a running system of RT components answers (docs/reference/rtc/rtc.md)."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from tickrig.wire.rtc_types.idl import Struct
 # Ports for observers of a running system: they display values, and inject values.
 
 HELD: Final = 1_000
-"""So many values of a port are held; of more the oldest are lost."""
+"""Number of values of a port that are kept. If there are more, the oldest values are lost."""
 
 LEASE_US: Final = 5_000_000
-"""An OutPort whose values were not requested for this long is no longer watched."""
+"""Time without a request for its values after which an OutPort is no longer watched."""
 
 
 @dataclass(frozen=True, slots=True)
 class _NumberedValue:
-    """A value that an OutPort wrote; numbers count from 1 on, for each time it is watched."""
+    """A value that an OutPort wrote. Numbers start at 1 each time the port is watched."""
 
     number: int
     value: Struct
@@ -42,7 +42,7 @@ class _NumberedValue:
 
 @dataclass(slots=True)
 class _WatchedPort:
-    """An InPort that takes what an OutPort writes."""
+    """An InPort that takes the values that an OutPort writes."""
 
     port: InPort[Any]
     requested_us: int
@@ -56,13 +56,13 @@ class _WatchedPort:
 
 
 class Probes:
-    """Watches OutPorts and injects into InPorts, each by a connector of its own.
+    """Probes that watch OutPorts and inject into InPorts, with a separate connector for each.
 
     The connectors belong to no component, so a saved system does not contain them. A connector
     that injects a value ends when the value was read.
 
     Args:
-        manager: has the ports.
+        manager: manager with the ports.
     """
 
     def __init__(self, manager: Manager) -> None:
@@ -71,17 +71,17 @@ class Probes:
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
     def watch(self, name: str, since: int = 0) -> tuple[tuple[_NumberedValue, ...], int]:
-        """Watch an OutPort from the first call on, and return the values that it wrote.
+        """Watch an OutPort from the first call on. Return the values that the port wrote.
 
         Args:
             name: name of the port, as in `Manager.port`.
             since: number of the last value that the caller knows.
 
         Returns:
-            The values after `since`, 1000 at most, and the number of the latest value.
+            The values after `since`, at most 1000, and the number of the latest value.
 
         Raises:
-            RtcRefused: there is no such port, or it is not an OutPort.
+            RtcRefused: there is no such port, or the port is not an OutPort.
         """
         port = self._manager.port(name)
         if not isinstance(port, OutPort):
@@ -92,14 +92,14 @@ class Probes:
         return tuple(seen for seen in watch.seen if seen.number > since), watch.count
 
     def inject(self, name: str, given: object) -> Struct:
-        """Write a value to an InPort, as a connected OutPort would, and return it.
+        """Write a value to an InPort as a connected OutPort would. Return the value.
 
         Args:
             name: name of the port, as in `Manager.port`.
             given: the value as JSON; see `literal`.
 
         Raises:
-            RtcRefused: there is no such port, it is not an InPort, or the value does not fit.
+            RtcRefused: there is no such port, the port is not an InPort, or the value does not fit.
         """
         port = self._manager.port(name)
         if not isinstance(port, InPort):
@@ -112,7 +112,7 @@ class Probes:
         return value
 
     def tick(self, now_us: int) -> None:
-        """Take what was written, and end what is not needed any more."""
+        """Take the written values, and end connectors that are not needed any more."""
         for port, watch in tuple(self._watches.items()):
             watch.take()
             if now_us - watch.requested_us > LEASE_US or not watch.port.connectors:
@@ -134,31 +134,31 @@ class _Runner(Protocol):
     """An object that runs a system: `RealTime`, or the loop of a server that contains the system.
 
     Attributes:
-        after_tick: called with the time in us after each tick.
+        after_tick: function that is called with the time in us after each tick.
     """
 
     after_tick: list[Callable[[int], None]]
 
     @property
     def late_ticks(self) -> int:
-        """How many ticks began late."""
+        """The number of ticks that began late."""
         ...
 
     @property
     def worst_late_us(self) -> int:
-        """By how much the worst of them was late."""
+        """The largest delay of a tick in us."""
         ...
 
     def stop(self) -> None:
-        """End after the present tick."""
+        """End the run after the present tick."""
 
 
 class SystemControl(RequestDispatcher):
-    """Answers requests about one system; the system must not tick during a request.
+    """A control that answers requests about one system. The system must not tick during a request.
 
     Args:
-        manager: the system.
-        runner: runs the system.
+        manager: manager of the system.
+        runner: runner of the system.
     """
 
     def __init__(self, manager: Manager, runner: _Runner) -> None:
@@ -186,7 +186,7 @@ class SystemControl(RequestDispatcher):
         )
 
     def saved(self, what: str) -> str:
-        """Return the system as a file; ValueError unless `what` is `toml` or `xml`."""
+        """Return the system as a file. Raise ValueError unless `what` is `toml` or `xml`."""
         match what:
             case "toml":
                 return write_toml(describe(self._manager))
@@ -237,7 +237,7 @@ class SystemControl(RequestDispatcher):
         return {}
 
     def _ports(self, *names: str) -> tuple[AnyPort, ...]:
-        """Return a port, or all those of a component."""
+        """Return a port, or all ports of a component."""
         if len(names) != 1:
             raise ValueError(f"ports are one or two names, not {len(names)}")
         (name,) = names
@@ -259,7 +259,7 @@ class SystemControl(RequestDispatcher):
         return {}
 
     def _add_set(self, request: Object) -> Object:
-        """Add a configuration set with the values of another one."""
+        """Add a configuration set with the values of another set."""
         configuration = self._configuration(request)
         set_id, like = text_of(request, "set"), text_of(request, "like")
         if not set_id or set_id in configuration.sets:
@@ -305,7 +305,7 @@ class SystemControl(RequestDispatcher):
 
 
 def _texts(request: Object, key: str, count: int) -> list[str]:
-    """Return a list of strings, of a length unless that is 0."""
+    """Return a list of strings. Its length is checked unless the wanted length is 0."""
     value = request.get(key)
     texts = [text for text in value if isinstance(text, str)] if isinstance(value, list) else None
     if texts is None or texts != value or (count and len(texts) != count):
@@ -314,7 +314,7 @@ def _texts(request: Object, key: str, count: int) -> list[str]:
 
 
 def describe_component(manager: Manager, component: RtComponent) -> Object:
-    """Return all that there is to know about a component."""
+    """Return the full description of a component."""
     name, spec = component.instance_name, component.spec
     return {
         "name": name,
@@ -340,7 +340,7 @@ def describe_component(manager: Manager, component: RtComponent) -> Object:
 
 
 def _describe_configuration(configuration: Configuration) -> Object:
-    """Return the sets, and the parameters with the values that hold now."""
+    """Return the sets, and the parameters with their present values."""
     return {
         "active": configuration.active_id,
         "sets": {set_id: dict(values) for set_id, values in configuration.sets.items()},

@@ -32,7 +32,7 @@ from tickrig.host.text.values import format_time
 
 
 def _component_row(component: Any) -> str:
-    """Write a line of `ls -l`: state, ports with those that are connected, rate, type, name."""
+    """Return a line of `ls -l` with state, connected ports, rate, type and name."""
     ports = component["ports"]
     connected = sum(1 for port in ports if port["connectors"])
     rate = "".join(f"{context['rate_hz']:g}Hz" for context in component["contexts"][:1])
@@ -44,10 +44,10 @@ def _component_row(component: Any) -> str:
 
 
 def component_lines(component: Any, *, long: bool) -> Iterator[str]:
-    """Write a component as `cat` shows it.
+    """Return the lines of a component in `cat`.
 
     Args:
-        component: its description.
+        component: description of the component.
         long: whether to show the properties of connectors, and all configuration sets.
     """
     yield f"{component['name']}  {component['state'].capitalize()}"
@@ -65,7 +65,7 @@ def component_lines(component: Any, *, long: bool) -> Iterator[str]:
 
 
 def _port_line(port: Any) -> str:
-    """Write what a port is: its kind, name and data type."""
+    """Return the kind, name and data type of a port as text."""
     return f"  {port['kind']:<14}{port['name']}  {_short_type(port['data_type'])}".rstrip()
 
 
@@ -83,7 +83,10 @@ def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
 
 
 def _configuration_lines(configuration: Any, *, long: bool) -> Iterator[str]:
-    """Write the parameters with the values that hold, and with `long` those of each set."""
+    """Return the parameters with their present values.
+
+    With `long`, also return those of each set.
+    """
     for parameter in configuration["parameters"]:
         value = f"{parameter['name']} = {parameter['value']} {parameter['unit']}".rstrip()
         allowed = f"  [{parameter['constraint']}]" if parameter["constraint"] else ""
@@ -98,7 +101,7 @@ def _configuration_lines(configuration: Any, *, long: bool) -> Iterator[str]:
 
 
 def _value_line(value: Any) -> str:
-    """Write a value of a port: its time in seconds, if it has a time, and its data.
+    """Return a value of a port as text, with its time in seconds, if it has a time, and its data.
 
     >>> _value_line({"tm": {"sec": 1, "nsec": 500000000}, "data": -5})
     '1.500000 -5'
@@ -112,7 +115,7 @@ def _value_line(value: Any) -> str:
 
 
 def _short_type(idl_id: str) -> str:
-    """Write `IDL:RTC/TimedLong:1.0` as `TimedLong`."""
+    """Return `IDL:RTC/TimedLong:1.0` as `TimedLong`."""
     return idl_id.removeprefix("IDL:").removesuffix(":1.0").removeprefix("RTC/")
 
 
@@ -358,7 +361,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
 
 
 def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
-    """Return a command that asks components for a state, and waits until they are there."""
+    """Return a command that requests a state of components, and waits until they are in it."""
     told = f"{text}, and wait until they are {wanted.capitalize()}."
     example = f"tickrig rtc {name} ConsoleIn0 ConsoleOut0"
 
@@ -391,7 +394,7 @@ def _property(word: str) -> tuple[str, str]:
 
 
 def _values(socket: Path, port: str, count: int | None, until_s: float | None) -> Iterator[Any]:
-    """Yield values until there were enough of them, or it is time."""
+    """Yield values until there are enough values, or the time is over."""
     with refused_by(socket, SYSTEM), ControlClient(socket) as client:
         latest = client.request("seen", port=port)["latest"]
         given = 0
@@ -418,7 +421,7 @@ VERBS: Final = (ls, cat, create, con, dis, *_MOVES, exit_, inject, print_)
 # The verbs of `tickrig rtc` about a system as a whole.
 
 _FILES: Final = "tickrig.host.rtc.system.system_file"
-"""Named by its path: most verbs do without it."""
+"""Module that is loaded by its path, because most verbs do not need it."""
 
 
 @click.command()

@@ -1,4 +1,4 @@
-"""The System Editor of RT components: picture, states, connectors, configuration sets."""
+"""The System Editor of RT components, with picture, states, connectors and configuration sets."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class _Setting(NamedTuple):
     """A row of the details.
 
     Attributes:
-        set_id: a configuration set; empty for the present parameter values.
-        parameter: one parameter of the set; empty for the set itself.
+        set_id: ID of a configuration set, empty for the present parameter values.
+        parameter: name of one parameter of the set, empty for the set itself.
         value: value of the parameter.
-        peer: the other end of a connector of the port under the cursor; empty for other rows.
+        peer: other end of a connector of the port under the cursor, empty for other rows.
     """
 
     set_id: str = ""
@@ -50,11 +50,11 @@ class _Setting(NamedTuple):
 
 
 def _detail_rows(component: Any, port: str = "") -> list[CursorRow[_Setting]]:
-    """Return the rows that the details show of a component.
+    """Return the rows that the details pane shows for a component.
 
     Args:
-        component: its description.
-        port: full name of the port under the cursor; its connectors are the first rows.
+        component: description of the component.
+        port: full name of the port under the cursor. Its connectors are the first rows.
     """
     rows = list(_connector_rows(component, port)) if port else []
     configuration = component["configuration"]
@@ -101,10 +101,10 @@ def _connector_rows(component: Any, port: str) -> Iterator[CursorRow[_Setting]]:
 
 
 class SystemScreen(FramedApp):
-    """Shows a running system, and changes it by keys and mouse.
+    """A screen that shows a running system, and changes it by keys and mouse.
 
     Args:
-        link: the system.
+        link: link to the system.
         name: name of the system.
     """
 
@@ -151,13 +151,13 @@ class SystemScreen(FramedApp):
         yield KeyFooter()
 
     def on_mount(self) -> None:
-        """Begin to paint."""
+        """Start updating the screen."""
         self.status.can_focus = False
         self.view.focus()
         self.set_interval(PAINT_S, self.look)
 
     def look(self) -> None:
-        """Show how things are now; called ten times a second, and after each command."""
+        """Show the present state. This is called ten times a second, and after each command."""
         for answer in self._link.take_answers():
             if answer.text:
                 self.notify(answer.text, severity="error" if answer.refused else "information")
@@ -177,7 +177,7 @@ class SystemScreen(FramedApp):
         self.status.show([line])
 
     def _frame(self) -> None:
-        """Write the full names on the frames: the picture cuts them."""
+        """Write the full names on the frames, because the picture cuts them."""
         self.view.frame("system as it was" if self._link.problem else "system", self.view.at)
         component = self._component()
         if component is None:
@@ -192,20 +192,20 @@ class SystemScreen(FramedApp):
         return next((one for one in self._link.components if one["name"] == owner), None)
 
     def on_system_picture_moved(self) -> None:
-        """Show what belongs to the component under the cursor."""
+        """Show the details of the component under the cursor."""
         self.look()
 
     def on_cursor_view_entered(self) -> None:
-        """Edit the row that was chosen."""
+        """Edit the chosen row."""
         self.action_edit()
 
     def action_request(self, what: str) -> None:
-        """Ask the component under the cursor for a state."""
+        """Request a state of the component under the cursor."""
         if (owner := self.view.owner) and what in _MOVES:
             self._request(what, name=owner)
 
     def action_mark(self) -> None:
-        """Mark a port, or take the mark back."""
+        """Mark a port, or remove the mark."""
         if not (port := self.view.port):
             self._refuse("ports can be marked: go to one with the arrows")
             return
@@ -213,7 +213,7 @@ class SystemScreen(FramedApp):
         self.look()
 
     def action_connect(self) -> None:
-        """Connect the port that is marked with the one under the cursor."""
+        """Connect the marked port with the port under the cursor."""
         marked, port = self.view.marked, self.view.port
         if not marked:
             self._refuse("mark a port first (m)")
@@ -226,7 +226,7 @@ class SystemScreen(FramedApp):
                 self.look()
 
     def action_disconnect(self) -> None:
-        """End the connector of the port under the cursor, or the one that is chosen."""
+        """End the connector of the port under the cursor, or the chosen connector."""
         port, row = self.view.port, self.details.row
         peers = self.view.joined(port) if port else []
         if self.focused is self.details and row is not None and row.item.peer:
@@ -245,7 +245,7 @@ class SystemScreen(FramedApp):
             self.push_screen(ChoiceScreen(f"disconnect {port} from", rows), chosen)
 
     def action_edit(self) -> None:
-        """Ask for the value of the row under the cursor; of a set, activate it."""
+        """Ask for the value of the row under the cursor. If it is a set, activate the set."""
         component, row = self._component(), self.details.row
         if component is None or row is None or row.item == _Setting() or row.item.peer:
             self._refuse("go to a parameter or set in the details (Tab)")
@@ -265,7 +265,7 @@ class SystemScreen(FramedApp):
         self.push_screen(QuestionScreen(f"{name}: {parameter}{where}", value), answered)
 
     def action_add_set(self) -> None:
-        """Ask for a name, and make a configuration set like the one under the cursor."""
+        """Ask for a name, and make a configuration set like the set under the cursor."""
         component, row = self._component(), self.details.row
         if component is None or not component["configuration"]["parameters"]:
             self._refuse("go to a component with parameters")
@@ -281,7 +281,7 @@ class SystemScreen(FramedApp):
         self.push_screen(QuestionScreen(f"{name}: new set with the values of {like}", ""), answered)
 
     def action_save(self) -> None:
-        """Ask for a file, and write the system as it is."""
+        """Ask for a file, and write the system in its present state."""
 
         def answered(path: str | None) -> None:
             if not path:
@@ -300,7 +300,7 @@ class SystemScreen(FramedApp):
     def _request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object
     ) -> bool:
-        """Ask the system for something; False if it is not there."""
+        """Send a request to the system. Return False if the system is not available."""
         if self._link.problem:
             return self._refuse("the system is gone: nothing was done")
         self._link.request(do, then, **fields)

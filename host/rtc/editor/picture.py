@@ -59,11 +59,11 @@ from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.text.page_text import in_cells
 
 _Line = tuple[tuple[str, str], ...]
-"""Pieces of text with a style each, as `LineView` takes them."""
+"""Pieces of text with their styles, as `LineView` takes them."""
 
 _MOST_BOX: Final = 26
 _LEAST_BOX: Final = 9
-"""Cells of a box with its frame."""
+"""Width of a box with its frame in cells."""
 
 _STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
 _FRAMES: Final = {"ACTIVE": "green", "INACTIVE": "cyan", "ERROR": "bold red"}
@@ -75,14 +75,14 @@ _NAME: Final = "bold"
 
 _NORTH, _EAST, _SOUTH, _WEST = 1, 2, 4, 8
 _SIGNS: Final = "?│─└││┌├─┘─┴┐┤┬┼"
-"""The character by the sides to which wires go, as a sum of the four above."""
+"""Characters by the sides to which wires go. The index is the sum of the four numbers above."""
 
 _DASHED: Final = {"│": "╎", "─": "╌"}
 _ELSEWHERE: Final = "elsewhere"
 
 
 class _Place(NamedTuple):
-    """Where something is in a picture, in lines and cells."""
+    """The place of an item in a picture, in lines and cells."""
 
     line: int
     column: int
@@ -93,8 +93,8 @@ class Picture(NamedTuple):
     """A picture of a system.
 
     Attributes:
-        lines: text with styles.
-        places: places of boxes by their names, and of ports by their full names.
+        lines: lines of text with styles.
+        places: places of boxes by name, and of ports by full name.
     """
 
     lines: tuple[_Line, ...]
@@ -102,7 +102,7 @@ class Picture(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Cells of the widest line."""
+        """Number of cells of the widest line."""
         return max((sum(cell_len(text) for text, _ in line) for line in self.lines), default=0)
 
 
@@ -115,23 +115,25 @@ def draw(
     """Draw a system.
 
     Args:
-        boxes: components.
-        edges: connectors; an end that belongs to no box gets a box of its own.
-        columns: width of the screen in cells; a wider picture has a single column of boxes.
-        lit: styles of highlighted boxes and ports, by name; wires of such ports have them, too.
+        boxes: components of the system.
+        edges: connectors of the system. An end that belongs to no box gets a box of its own.
+        columns: width of the screen in cells. A picture that would be wider has a single column of
+            boxes.
+        lit: styles of highlighted boxes and ports, by name. Wires of highlighted ports have the
+            same style.
     """
     wires = [replace(one, source=_key(one.source), target=_key(one.target)) for one in edges]
     return _fitting(tuple(boxes), tuple(dict.fromkeys(wires)), columns).paint(lit or {})
 
 
 def _key(port: str) -> str:
-    """Return a full name as keys have it: `A0.out`, also of `A0:out`."""
+    """Return a full name in the form of keys, which is `A0.out`, also for `A0:out`."""
     return ".".join(_split(port))
 
 
 @lru_cache(maxsize=4)  # the cursor moves more often than the system changes
 def _fitting(boxes: tuple[Box, ...], wires: tuple[Edge, ...], columns: int) -> _Layout:
-    """Return the layout with most columns of boxes that fits, else the narrowest."""
+    """Return the layout with the most columns of boxes that fits, or else the narrowest layout."""
     all_boxes = _with_others(list(boxes), wires)
     layouts = (
         _Layout(all_boxes, wires, count, gap, columns)
@@ -147,13 +149,13 @@ def _fitting(boxes: tuple[Box, ...], wires: tuple[Edge, ...], columns: int) -> _
 
 
 def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) -> str:
-    """Return the next box or port in a direction; the same one if there is no other.
+    """Return the next box or port in a direction, or the same one if there is no other.
 
     Args:
         places: places of a picture.
         name: name of a box or port.
-        right: 1 for right, -1 for left, else 0.
-        down: 1 for down, -1 for up, else 0.
+        right: step to the right: 1 for right, -1 for left, or 0.
+        down: step down: 1 for down, -1 for up, or 0.
     """
     at = places[name]
 
@@ -169,7 +171,7 @@ def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) ->
 
 
 def _shown(name: str, width: int) -> str:
-    r"""Return a name as it is written into `width` cells; a cut one ends with `…`.
+    r"""Return a name as text of `width` cells. A cut name ends with `…`.
 
     >>> _shown("ロボット0", 6), _shown("a\x1b[1m\u0301b", 20)
     ('ロボ…', 'a␛[1m�b')
@@ -183,7 +185,7 @@ def _shown(name: str, width: int) -> str:
 
 
 def _with_others(boxes: list[Box], wires: Sequence[Edge]) -> list[Box]:
-    """Return the boxes, and one for each component that only wires name."""
+    """Return the boxes, and a box for each component that only wires name."""
     ports = {f"{box.name}.{port}" for box in boxes for port in (*box.ins, *box.outs)}
     ins, outs = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for wire in wires:
@@ -201,16 +203,16 @@ def _with_others(boxes: list[Box], wires: Sequence[Edge]) -> list[Box]:
 
 
 def _split(port: str) -> tuple[str, str]:
-    """Return the component and the port of a full name, as `A0.out` or `host/A0.rtc:out`.
+    """Return the component and the port of a full name such as `A0.out` or `host/A0.rtc:out`.
 
-    For a port of another system an engine may know only a single name.
+    An engine may know only a single name for a port of another system.
     """
     at = max(port.rfind("."), port.rfind(":"))
     return port[: max(0, at)] or port, port[at + 1 :]
 
 
 def _layers(names: Sequence[str], joins: Iterable[tuple[str, str]]) -> dict[str, int]:
-    """Return how many boxes are at most in front of each one that is joined with another."""
+    """Return the maximum number of boxes in front of each box that has a connector."""
     after = defaultdict[str, list[str]](list)
     for source, target in joins:
         if source != target:
@@ -241,7 +243,7 @@ def _layers(names: Sequence[str], joins: Iterable[tuple[str, str]]) -> dict[str,
 
 
 def _packed(intervals: Sequence[tuple[int, int]]) -> list[int]:
-    """Return a number for each interval so that no two of one number have a point in common."""
+    """Return a number for each interval, so that intervals with one number do not touch."""
     ends, numbers = list[int](), [0] * len(intervals)
     for place in sorted(range(len(intervals)), key=lambda one: intervals[one]):
         begin, end = intervals[place]
@@ -295,7 +297,7 @@ class _Layout:
         self._set_columns()
 
     def _place(self, count: int) -> dict[str, tuple[int, int]]:
-        """Return row and column of each box."""
+        """Return the row and column of each box."""
         joins = [(_owner(wire.source), _owner(wire.target)) for wire in self._wires]
         joined = {name for pair in joins for name in pair if pair[0] != pair[1]}
         names = [name for name in self._boxes if name in joined]
@@ -323,7 +325,7 @@ class _Layout:
         return cells
 
     def _is_dense(self, box: Box) -> bool:
-        """Return whether a box may have a port on each line: one side, across from no port."""
+        """Return whether a box may have a port on each line, without ports on both sides of one."""
         if box.ins and box.outs:
             return False
         row, column = self._cells[box.name]
@@ -344,7 +346,7 @@ class _Layout:
         return 2 + max(1, 2 * len(box.ins) - 1, 2 * len(box.outs))
 
     def _set_lines(self) -> None:
-        """Give tracks, then lines of rows and streets."""
+        """Assign tracks, then lines of rows and streets."""
         heights = [0] * self._rows
         for name, (row, _) in self._cells.items():
             heights[row] = max(heights[row], self._height(self._boxes[name]))
@@ -372,7 +374,7 @@ class _Layout:
         return self._tops[end.row] + end.line
 
     def _set_columns(self) -> None:
-        """Give lanes, then cells of channels and columns."""
+        """Assign lanes, then cells of channels and columns."""
         lanes: list[list[tuple[int, int, int, int]]] = [[] for _ in range(self._columns + 1)]
         for number, (a, b) in enumerate(self._ends_of):
             first, last = self._line(a), self._line(b)
@@ -420,7 +422,7 @@ class _Layout:
         return Picture(canvas.lines(self.height), places)
 
     def _path(self, number: int) -> list[tuple[int, int]]:
-        """Return the corners of a wire, as line and cell."""
+        """Return the corners of a wire as line and cell."""
         a, b = self._ends_of[number]
         first, last, lane = self._line(a), self._line(b), self._lanes[number, 0]
         begin, end = (first, self._edge(a)), (last, self._edge(b))
@@ -430,7 +432,7 @@ class _Layout:
         return [begin, (first, lane), (track, lane), (track, other), (last, other), end]
 
     def _edge(self, end: _End) -> int:
-        """Return the cell of the frame in which a port is."""
+        """Return the cell of the frame that contains a port."""
         left = self._lefts[end.column]
         return left if end.channel == end.column else left + self._widths[end.column] - 1
 
@@ -480,7 +482,7 @@ def _owner(port: str) -> str:
 
 
 def _street(a: _End, b: _End) -> int:
-    """Return the street through which a wire comes with the least way up and down."""
+    """Return the street that gives a wire the shortest way up and down."""
     return min(
         (a.row, a.row + 1, b.row, b.row + 1),
         key=lambda street: abs(2 * street - 2 * a.row - 1) + abs(2 * street - 2 * b.row - 1),
@@ -495,7 +497,7 @@ class _Canvas:
         self._wires = dict[tuple[int, int], tuple[int, str, bool]]()
 
     def text(self, line: int, cell: int, text: str, style: str) -> None:
-        """Write a text; the second cell of a wide character has no text."""
+        """Write a text. The second cell of a wide character has no text."""
         for one in text:
             self._texts[line, cell] = one, style
             cell += 1
@@ -532,7 +534,7 @@ class _Canvas:
 
 
 def _pieces(cells: Mapping[int, tuple[str, str]]) -> _Line:
-    """Return the cells of a line, those of one style in one piece."""
+    """Return the cells of a line. Adjacent cells of one style are one piece."""
     pieces = list[tuple[str, str]]()
     for cell in range(1 + max(cells, default=-1)):
         text, style = cells.get(cell, (" ", ""))

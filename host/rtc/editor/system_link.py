@@ -1,4 +1,7 @@
-"""A running system at its control socket, asked by a thread while a screen shows it."""
+"""A link to the control socket of a running system.
+
+A thread asks while a screen shows the system.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ class _Answer:
     """The result of a request.
 
     Attributes:
-        text: text for people; may be empty.
+        text: text for the user, which may be empty.
         refused: whether the request was refused.
     """
 
@@ -38,16 +41,16 @@ class _Request:
 
 
 class SystemLink:
-    """Reads the state of a system and sends it requests, in a thread of its own.
+    """A link that reads the state of a system and sends it requests, in a thread of its own.
 
     The connection is made again if it breaks, because the system may be restarted or replaced.
 
     Args:
-        socket: the control socket of the system.
+        socket: control socket of the system.
 
     Attributes:
         components: the latest descriptions of the components.
-        problem: the reason why the state is unknown; empty while the system answers.
+        problem: reason why the state is unknown, empty while the system answers.
     """
 
     def __init__(self, socket: Path) -> None:
@@ -62,24 +65,25 @@ class SystemLink:
     def request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object
     ) -> None:
-        """Queue a request; `take_answers` returns its result.
+        """Queue a request. `take_answers` returns its result.
 
         Args:
-            do: the verb of the request.
-            then: called in the thread with the answer; returns the text to show.
+            do: verb of the request.
+            then: function that is called in the thread with the answer, and returns the text to
+                show.
             fields: fields of the request.
         """
         self._requests.put(_Request(do, fields, then or (lambda answer: "")))
 
     def take_answers(self) -> list[_Answer]:
-        """Return what came of requests since the last call."""
+        """Return the results of requests since the last call."""
         taken = list[_Answer]()
         while self._answers:
             taken.append(self._answers.popleft())
         return taken
 
     def turn(self) -> None:
-        """Make all requests there are, and describe the system; called by the thread."""
+        """Execute all queued requests, and describe the system. The thread calls this method."""
         while not self._requests.empty():
             if (request := self._requests.get()) is not None:
                 self._make(request)
@@ -90,11 +94,11 @@ class SystemLink:
             self.components, self.problem = components, ""
 
     def start(self) -> None:
-        """Begin to ask."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Ask no more; a request under way is not waited for."""
+        """Stop the thread without waiting for a running request."""
         self._requests.put(None)
 
     def _run(self) -> None:
@@ -122,7 +126,7 @@ class SystemLink:
             self._answers.append(_Answer(text))
 
     def _request(self, do: str, **fields: object) -> Object | str:
-        """Return the answer, or why there is none."""
+        """Return the answer, or the reason why there is none."""
         try:
             if self._client is None:
                 self._client = ControlClient(self._socket)

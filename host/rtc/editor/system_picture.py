@@ -1,4 +1,4 @@
-"""The picture of a system on a screen: a cursor goes from port to port."""
+"""The picture of a system on a screen, in which a cursor moves from port to port."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tickrig.host.tui import LineView
 
 
 class SystemPicture(LineView):
-    """Shows components as boxes and connectors as wires.
+    """A picture that shows components as boxes and connectors as wires.
 
     Attributes:
-        at: full name of the box or port under the cursor; empty if there are no boxes.
-        marked: the port that is to be connected; empty if there is none.
-        picture: the picture that is shown.
+        at: full name of the box or port under the cursor, empty if there are no boxes.
+        marked: full name of the port that is to be connected, empty if there is none.
+        picture: picture that is shown.
     """
 
     HELP = """
@@ -47,7 +47,7 @@ class SystemPicture(LineView):
     ]
 
     class Moved(Message):
-        """Something else is under the cursor."""
+        """Message that another item is under the cursor."""
 
     def __init__(self, id: str = "picture") -> None:  # noqa: A002 - Textual's name
         super().__init__(id)
@@ -59,22 +59,22 @@ class SystemPicture(LineView):
 
     @property
     def owner(self) -> str:
-        """The component in whose box the cursor is; empty without one."""
+        """The component whose box contains the cursor, empty without a component."""
         return next((box.name for box in self._boxes if self.at in _names(box)), "")
 
     @property
     def port(self) -> str:
-        """The full name of the port under the cursor; empty on a component."""
+        """The full name of the port under the cursor, empty on a component."""
         return self.at if self.at in self.picture.places and self.at != self.owner else ""
 
     @property
     def is_out(self) -> bool:
-        """Whether the port under the cursor is at the right of its box."""
+        """Whether the port under the cursor is on the right side of its box."""
         return any(f"{box.name}.{port}" == self.at for box in self._boxes for port in box.outs)
 
     @property
     def _names(self) -> list[str]:
-        """The components, as the eye reads the picture."""
+        """The components in the reading order of the picture."""
         places = self.picture.places
         return sorted((box.name for box in self._boxes), key=lambda name: places[name][:2])
 
@@ -84,7 +84,7 @@ class SystemPicture(LineView):
         return [b if a == port else a for a, b in ends if port in (a, b)]
 
     def offer(self, boxes: Sequence[Box], edges: Sequence[Edge]) -> None:
-        """Show a system; the cursor stays on what it was on."""
+        """Show a system. The cursor stays on the same item."""
         self._boxes, self._edges = tuple(boxes), tuple(edges)
         names = {one for box in boxes for one in _names(box)}
         if self.marked not in names:
@@ -111,7 +111,7 @@ class SystemPicture(LineView):
         return draw(self._boxes, self._edges, columns, lit)
 
     def go_to(self, name: str) -> None:
-        """Put the cursor on a box or port, and bring it into view."""
+        """Put the cursor on a box or port, and scroll it into view."""
         if name not in self.picture.places:
             return
         self.at = name
@@ -125,7 +125,7 @@ class SystemPicture(LineView):
         self.post_message(self.Moved())
 
     def action_go(self, right: int, down: int) -> None:
-        """Move the cursor to what is next in a direction."""
+        """Move the cursor to the next item in a direction."""
         if self.at in self.picture.places:
             self.go_to(neighbour(self.picture.places, self.at, right, down))
 
@@ -141,7 +141,7 @@ class SystemPicture(LineView):
             self.go_to(names[place])
 
     def on_click(self, event: Click) -> None:
-        """Put the cursor where the mouse is."""
+        """Put the cursor at the position of the mouse."""
         at = event.get_content_offset(self)
         if at is None:
             return
@@ -151,19 +151,19 @@ class SystemPicture(LineView):
                 self.go_to(name)
 
     def on_focus(self, event: Focus) -> None:
-        """Show that the keys go here."""
+        """Show that the picture has the keyboard focus."""
         self.paint()
 
     def on_blur(self, event: Blur) -> None:
-        """Show that the keys go elsewhere."""
+        """Show that the picture does not have the keyboard focus."""
         self.paint()
 
     def on_resize(self, event: Resize) -> None:
-        """Draw for the new width."""
+        """Draw the picture for the new width."""
         self.paint()
 
     def frame(self, title: str, below: str = "") -> None:
-        """Write on the frame what changed: it paints the whole view again."""
+        """Update the frame only after a change, because this paints the whole view again."""
         if str(self.border_title or "") != title:
             self.border_title = Content(title)
         if str(self.border_subtitle or "") != below:

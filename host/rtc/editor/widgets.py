@@ -1,4 +1,4 @@
-"""Widgets of editors: rows of which one is under the cursor, a question, and a choice."""
+"""Widgets of editors: rows with a cursor, a question, and a choice."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class CursorRow(NamedTuple, Generic[_T]):
     """A line, and the item that it represents.
 
     Attributes:
-        key: unique key of the item; it does not change while the item exists.
-        line: the text.
+        key: unique key of the item. It does not change while the item exists.
+        line: text of the line.
         item: the represented item.
     """
 
@@ -36,18 +36,18 @@ class CursorRow(NamedTuple, Generic[_T]):
 _FOCUSED: Final = "reverse"
 _ELSEWHERE: Final = "underline"
 _MARGIN: Final = 2
-"""Columns at the left in which a click opens or folds."""
+"""Number of columns at the left in which a click opens or folds a row."""
 
 
 class CursorView(LineView, Generic[_T]):
-    """Shows rows; the cursor stays on its item while other rows are added and removed.
+    """Rows with a cursor. The cursor stays on its item while other rows are added and removed.
 
     If the row under the cursor is cut off, its end is shown below the rows.
 
     Attributes:
-        rows_shown: the rows.
-        cursor: the number of the row under the cursor.
-        title: shown in the upper border.
+        rows_shown: rows of the view.
+        cursor: number of the row under the cursor.
+        title: title that is shown in the upper border.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -61,13 +61,13 @@ class CursorView(LineView, Generic[_T]):
     ]
 
     class Moved(Message):
-        """Another row is under the cursor, or others are in view."""
+        """Message that another row is under the cursor, or that other rows are visible."""
 
     class Entered(Message):
-        """The row under the cursor was chosen.
+        """Message that the row under the cursor was chosen.
 
         Attributes:
-            view: the view that has the row.
+            view: view that contains the row.
         """
 
         def __init__(self, view: CursorView[_T]) -> None:
@@ -82,7 +82,7 @@ class CursorView(LineView, Generic[_T]):
 
     @property
     def row(self) -> CursorRow[_T] | None:
-        """The row under the cursor, None if there is none."""
+        """The row under the cursor, or None if there is none."""
         return self.rows_shown[self.cursor] if self.rows_shown else None
 
     @property
@@ -116,7 +116,7 @@ class CursorView(LineView, Generic[_T]):
         return int(self.scrollable_content_region.width)
 
     def put_cursor(self, number: int) -> None:
-        """Put the cursor on a row, and bring that into view."""
+        """Put the cursor on a row, and scroll the row into view."""
         self.cursor = max(0, min(number, len(self.rows_shown) - 1))
         if self.cursor < self.top:
             self.scroll_to(y=self.cursor, animate=False, immediate=True)
@@ -130,7 +130,7 @@ class CursorView(LineView, Generic[_T]):
         self.put_cursor(self.cursor + rows)
 
     def action_page(self, pages: int) -> None:
-        """Move the cursor by as many rows as are in view."""
+        """Move the cursor by the number of visible rows."""
         self.put_cursor(self.cursor + pages * max(1, self.rows - 1))
 
     def action_enter(self) -> None:
@@ -139,7 +139,7 @@ class CursorView(LineView, Generic[_T]):
             self.post_message(self.Entered(self))
 
     def on_click(self, event: Click) -> None:
-        """Put the cursor where the mouse is; a double click, or one at the margin, chooses."""
+        """Put the cursor at the mouse. A double click, or a click at the margin, chooses."""
         at = event.get_content_offset(self)
         if at is not None and self.top + at.y < len(self.rows_shown):
             self.put_cursor(self.top + at.y)
@@ -147,15 +147,15 @@ class CursorView(LineView, Generic[_T]):
                 self.action_enter()
 
     def on_focus(self, event: Focus) -> None:
-        """Show that the keys go here."""
+        """Show that the view has the keyboard focus."""
         self.paint()
 
     def on_blur(self, event: Blur) -> None:
-        """Show that the keys go elsewhere."""
+        """Show that the view does not have the keyboard focus."""
         self.paint()
 
     def _frame(self, below: str) -> None:
-        """Write on the frame what changed: it paints the whole view again."""
+        """Update the frame only after a change, because this paints the whole view again."""
         if (self.title, below) != self._framed:
             self._framed = self.title, below
             self.border_title = Content(self.title)
@@ -168,11 +168,11 @@ class CursorView(LineView, Generic[_T]):
 
 
 class QuestionScreen(ModalScreen[str | None]):
-    """Asks for a line; the result is None without an answer.
+    """A screen that asks for a line. The result is None without an answer.
 
     Args:
-        text: the question.
-        answer: the initial answer.
+        text: text of the question.
+        answer: initial answer.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
@@ -189,29 +189,29 @@ class QuestionScreen(ModalScreen[str | None]):
         self._text, self._answer = text, answer
 
     def compose(self) -> ComposeResult:
-        """Lay it out."""
+        """Lay out the question."""
         with Vertical():
             yield Label(self._text, markup=False)
             yield Input(self._answer, select_on_focus=True, compact=True)
             yield Label("enter: take it    escape: leave it", classes="dim")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Take the answer."""
+        """Accept the answer."""
         self.dismiss(event.value)
 
     def action_leave(self) -> None:
-        """Take no answer."""
+        """Leave without an answer."""
         self.dismiss(None)
 
 
 class ChoiceScreen(ModalScreen[_T | None]):
-    """Asks for one of several rows; only rows that contain the typed text are shown.
+    """A screen that asks for one of several rows. Only rows with the typed text are shown.
 
     The result is None without an answer.
 
     Args:
-        text: the question.
-        rows: the rows to choose from.
+        text: text of the question.
+        rows: rows to choose from.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -236,7 +236,7 @@ class ChoiceScreen(ModalScreen[_T | None]):
         self.choices = CursorView[_T]("choices")
 
     def compose(self) -> ComposeResult:
-        """Lay it out."""
+        """Lay out the question and the rows."""
         with Vertical():
             yield Label(self._text, markup=False)
             yield Input(placeholder="type to search", compact=True)
@@ -249,11 +249,11 @@ class ChoiceScreen(ModalScreen[_T | None]):
         self.call_after_refresh(self.choices.offer, self._rows)
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """Show the rows that contain what is typed."""
+        """Show the rows that contain the typed text."""
         self._search(event.value)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Take the row under the cursor."""
+        """Choose the row under the cursor."""
         self._search(event.value)
         if self.choices.row is not None:
             self.dismiss(self.choices.row.item)
@@ -268,13 +268,13 @@ class ChoiceScreen(ModalScreen[_T | None]):
         self.choices.offer(found)
 
     def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
-        """Take the row that was chosen by the mouse."""
+        """Choose the row that was clicked."""
         event.stop()
         if self.choices.row is not None:
             self.dismiss(self.choices.row.item)
 
     def on_cursor_view_moved(self, event: CursorView.Moved) -> None:
-        """Keep it from the screen below."""
+        """Stop the event, so that the screen below does not get it."""
         event.stop()
 
     def action_move(self, rows: int) -> None:
@@ -282,9 +282,9 @@ class ChoiceScreen(ModalScreen[_T | None]):
         self.choices.action_move(rows)
 
     def action_page(self, pages: int) -> None:
-        """Move the cursor by as many rows as are in view."""
+        """Move the cursor by the number of visible rows."""
         self.choices.action_page(pages)
 
     def action_leave(self) -> None:
-        """Take no answer."""
+        """Leave without an answer."""
         self.dismiss(None)

@@ -1,4 +1,4 @@
-"""Join a system with the engines that a command line asks for."""
+"""Joining a system with the engines that a command line names."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def engines_joined(
     *,
     fixed: bool = False,
 ) -> Iterator[None]:
-    """Join a system with others until the end.
+    """Join a system with other systems until the end.
 
     Args:
-        options: the engines and their settings.
-        manager: the manager of the system; it is not running yet.
-        attach: makes the calls of other threads run in the manager's thread.
-        stop: ends the command, if a peer requests that.
-        fixed: only the command creates and ends components, peers cannot.
+        options: engines to join, with their settings.
+        manager: manager of the system, which is not running yet.
+        attach: function that makes calls of other threads run in the manager's thread.
+        stop: function that ends the command, if a peer requests that.
+        fixed: whether only the command may create and end components, and peers may not.
 
     Raises:
         Refused: an engine lacks its extra, or does not support the options.

@@ -1,4 +1,4 @@
-"""Connectors of data ports with ports of peers, whatever engine reaches them (OpenRTM-aist 1.x)."""
+"""Connectors of data ports to ports of peers, for any engine (OpenRTM-aist 1.x)."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ _LOG: Final = log_of(__name__)
 
 
 class PeerState(StrEnum):
-    """What is known of a peer."""
+    """Knowledge about a peer."""
 
     CONNECTED = "connected"  # it answered the latest call, or none was made
     LOST = "lost"  # the latest call had no answer
 
 
 class PeerWatch:
-    """Records how each call into a peer ended; logs a line when a peer is lost or returns.
+    """A record of how each call to a peer ended. A line is logged when a peer is lost or returns.
 
-    One thread records; any thread may read.
+    One thread records. Any thread may read.
 
     Args:
-        who: the connector, for people.
+        who: name of the connector, for display.
 
     Attributes:
         state: state of the peer.
-        status: status of the latest call; CONNECTION_LOST without an answer.
+        status: status of the latest call, or CONNECTION_LOST without an answer.
     """
 
     def __init__(self, who: str) -> None:
@@ -53,14 +53,14 @@ class PeerWatch:
         self.state, self.status = PeerState.CONNECTED, PortStatus.PORT_OK
 
     def answered(self, status: PortStatus) -> None:
-        """Note an answer."""
+        """Record an answer."""
         if self.state is PeerState.LOST:
             gone_s = time.monotonic() - self._lost_s
             _LOG.warning("%s: the peer answers again, after %.1f s", self._who, gone_s)
         self.state, self.status = PeerState.CONNECTED, status
 
     def unanswered(self, error: Exception) -> None:
-        """Note that there was no answer, and why."""
+        """Record that there was no answer, and the reason."""
         if self.state is PeerState.CONNECTED:
             reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
             _LOG.warning("%s: the peer does not answer: %s", self._who, reason)
@@ -72,16 +72,20 @@ T = TypeVar("T", bound=Struct)
 P = TypeVar("P")
 
 _SEND_LENGTH: Final = "64"
-"""Values that wait for a peer, if the properties do not say how many."""
+"""Default number of values that wait for a peer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T, P]):
-    """Converts values of a port to the form that a peer gets: bytes, or messages of an engine.
+    """A codec that converts values of a port to the form that a peer gets.
+
+    The form is bytes, or messages of an engine.
 
     Attributes:
-        encode: converts a value to this form; ValueError if that is not possible.
-        decode: converts this form to a value; ValueError if it is not a value.
+        encode: function that converts a value to this form. It raises ValueError if that is not
+            possible.
+        decode: function that converts this form to a value. It raises ValueError if it is not a
+            value.
     """
 
     encode: Callable[[T], P]
@@ -99,9 +103,10 @@ class PeerEnd:
 
     Attributes:
         port: name of the peer's port, such as `other/ConsoleOut0.rtc:in`.
-        connector_id: unique in this system.
-        properties: `dataport.*`, as `ConnectorOptions.parse` takes them; others are kept.
-        name: for people; the ID if left out.
+        connector_id: ID that is unique in this system.
+        properties: properties `dataport.*`, as `ConnectorOptions.parse` takes them. Other
+            properties are kept.
+        name: name of the connector for display. By default, it is the ID.
     """
 
     port: str
@@ -111,7 +116,7 @@ class PeerEnd:
 
     @property
     def options(self) -> connector.ConnectorOptions:
-        """What the properties say; RtcRefused if they cannot be."""
+        """Options in the properties. Raises RtcRefused if they are impossible."""
         lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
         if lengths.isdisjoint(self.properties):
             return connector.ConnectorOptions.parse(
@@ -147,7 +152,7 @@ class _LockedBuffer(RingBuffer[P]):
         self._lock = threading.Lock()
 
     def write(self, value: P) -> PortStatus:
-        """Put a value behind the others; see `RingBuffer.write`."""
+        """Add a value at the end; see `RingBuffer.write`."""
         with self._lock:
             return super().write(value)
 
@@ -170,7 +175,7 @@ class _ArrivalBuffer(RingBuffer[P]):
         self._lock, self._arrived = threading.Lock(), deque[P](maxlen=options.length)
 
     def arrive(self, value: P) -> tuple[PortStatus, bool]:
-        """Take a value, in any thread.
+        """Add a value in any thread.
 
         Returns:
             The status that `write` would return, and whether the value is the first that waits.
@@ -185,7 +190,7 @@ class _ArrivalBuffer(RingBuffer[P]):
             return PortStatus.PORT_OK, len(self._arrived) == 1
 
     def let_in(self) -> None:
-        """Put what waits into the buffer, in the thread of the manager."""
+        """Move waiting values into the buffer, in the thread of the manager."""
         with self._lock:
             for value in self._arrived:
                 self.write(value)
@@ -196,8 +201,9 @@ class _SendBuffer(RingBuffer[P]):
     """A ring buffer that one thread fills and another one empties.
 
     Args:
-        options: its length, and which values are lost when it is full.
-        wake: called when there are values to take; then `take` is called until the buffer is empty.
+        options: settings with the length of the buffer, and the policy for a full buffer.
+        wake: function that is called when there are values to take. After that, `take` is called
+            until the buffer is empty.
 
     Attributes:
         dropped: number of values that were lost because the buffer was full.
@@ -210,7 +216,7 @@ class _SendBuffer(RingBuffer[P]):
         self._lock, self._wake, self._woken, self.dropped = threading.Lock(), wake, False, 0
 
     def write(self, value: P) -> PortStatus:
-        """Put a value behind the others; see `RingBuffer.write`."""
+        """Add a value at the end; see `RingBuffer.write`."""
         with self._lock:
             self.dropped += len(self._values) == self._options.length
             status = super().write(value)
@@ -220,14 +226,14 @@ class _SendBuffer(RingBuffer[P]):
         return status
 
     def take(self) -> tuple[P, ...]:
-        """Take the oldest value, if there is one."""
+        """Take the oldest value, or None if there is no value."""
         with self._lock:
             taken = self.pop()
             self._woken = bool(taken)
         return taken
 
     def put_back(self, value: P) -> None:
-        """Put a value that was taken before the others again; if it is full, one is lost."""
+        """Put back a value at the front. If the buffer is full, one value is lost."""
         with self._lock:
             full = len(self._values) == self._options.length
             self.dropped += full
@@ -247,7 +253,7 @@ class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> _P_co | None:
-        """Take the next value out of the peer's port; None if the port has no value.
+        """Take the next value from the peer's port, or return None if the port has no value.
 
         The call may wait up to a time-out. Any exception means that there was no answer.
         """
@@ -255,7 +261,10 @@ class _OutPortConsumer(Protocol[_P_co]):
 
 
 class _InPortConnector(connector.Connector[T], Generic[T, P]):
-    """Decodes values from a peer; logs the first one that cannot be decoded."""
+    """A connector that decodes values from a peer.
+
+    The first value that cannot be decoded is logged.
+    """
 
     def __init__(self, port: InPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue) -> None:
         push, flush = connector.DataflowType.PUSH, connector.SubscriptionType.FLUSH
@@ -278,15 +287,15 @@ class _InPortConnector(connector.Connector[T], Generic[T, P]):
 
 
 class InPortPushConnector(_InPortConnector[T, P]):
-    """Receives the values that a peer puts into an InPort.
+    """A connector that receives the values that a peer puts into an InPort.
 
     Args:
-        port: the local port.
-        end: the settings agreed with the peer.
-        codec: decodes the values.
-        calls: runs calls in the manager's thread.
-        post: schedules a call in that thread before the next tick; if left out, each value wakes
-            up the thread.
+        port: local port of the connector.
+        end: settings agreed with the peer.
+        codec: codec that decodes the values.
+        calls: queue that runs calls in the manager's thread.
+        post: function that schedules a call in that thread before the next tick. By default, each
+            value wakes up the thread.
 
     Raises:
         RtcRefused: the port has a connector with this ID, or the properties are not possible.
@@ -306,13 +315,13 @@ class InPortPushConnector(_InPortConnector[T, P]):
         self.buffer, self._post = _ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
-        """Put a value into the buffer, in any thread; it can be read before the next tick.
+        """Put a value into the buffer, in any thread. The value can be read before the next tick.
 
         This method does not wait for the manager's thread, because that would take twice as long
         as the call of an ORB itself.
 
         Returns:
-            PORT_OK, or the status of the buffer; INVALID_ARGS if the value cannot be decoded,
+            PORT_OK, or the status of the buffer. INVALID_ARGS if the value cannot be decoded, or
             CONNECTION_LOST after the end of the connector.
         """
         if (value := self._decoded(payload)) is None:
@@ -332,8 +341,9 @@ class _PulledBuffer(RingBuffer[T]):
     """A ring buffer that requests more values as soon as it is empty.
 
     Args:
-        options: its settings.
-        request: called on each read of the empty buffer, and after the last value was read.
+        options: settings of the buffer.
+        request: function that is called on each read of the empty buffer, and after the last value
+            was read.
     """
 
     __slots__ = ("_request",)
@@ -344,7 +354,7 @@ class _PulledBuffer(RingBuffer[T]):
 
     @property
     def readable(self) -> bool:
-        """Whether `read` finds a new value; if not, one is fetched."""
+        """Whether `read` finds a new value. If not, a value is fetched."""
         found = len(self._values) > self._skip
         if not found:
             self._request()
@@ -359,18 +369,18 @@ class _PulledBuffer(RingBuffer[T]):
 
 
 class InPortPullConnector(_InPortConnector[T, P]):
-    """Fetches values of a peer's OutPort, in the thread of that peer.
+    """A connector that fetches values of a peer's OutPort, in the thread of that peer.
 
-    Reading the InPort, or checking it for new values, does not wait. It requests the next value;
-    one value is fetched at a time. So a value is as old as the previous reading.
+    Reading the InPort, or checking it for new values, does not wait. It requests the next value.
+    One value is fetched at a time. Therefore a value is as old as the previous reading.
 
     Args:
-        port: the local port.
-        end: the settings agreed with the peer.
-        codec: decodes the values.
-        consumer: reaches the peer's OutPort.
-        thread: makes the calls.
-        calls: runs calls in the manager's thread.
+        port: local port of the connector.
+        end: settings agreed with the peer.
+        codec: codec that decodes the values.
+        consumer: consumer that reaches the peer's OutPort.
+        thread: thread that makes the calls.
+        calls: queue that runs calls in the manager's thread.
 
     Raises:
         RtcRefused: the port has a connector with this ID, or the properties are not possible.
@@ -401,7 +411,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
             self._thread.submit(self._fetch)
 
     def _fetch(self) -> float | None:
-        """Get a value, in the thread of the peer."""
+        """Get a value in the thread of the peer."""
         if not self.joined:
             return None
         try:
@@ -432,7 +442,7 @@ class _InPortConsumer(Protocol[_P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: _P_contra, /) -> PortStatus:
-        """Put a value into the peer's port, and return the status that the peer reports.
+        """Put a value into the peer's port. Return the status that the peer reports.
 
         The call may wait up to a time-out. Any exception means that there was no answer.
         """
@@ -440,20 +450,20 @@ class _InPortConsumer(Protocol[_P_contra]):
 
 
 class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
-    """Pushes values from an OutPort to a peer, in the thread of that peer.
+    """A connector that pushes values from an OutPort to a peer, in the thread of that peer.
 
-    `write` encodes values and buffers them; it does not block. A value that the peer did not answer
-    is sent again after the thread's `retry_s`; until then the policy of the buffer applies.
+    `write` encodes values and buffers them. It does not block. A value that the peer did not answer
+    is sent again after the thread's `retry_s`. Until then, the policy of the buffer applies.
 
     Args:
-        port: the local port.
-        end: the settings agreed with the peer.
-        codec: encodes the values.
-        consumer: reaches the peer's InPort.
-        thread: makes the calls.
+        port: local port of the connector.
+        end: settings agreed with the peer.
+        codec: codec that encodes the values.
+        consumer: consumer that reaches the peer's InPort.
+        thread: thread that makes the calls.
 
     Attributes:
-        buffer: values for the peer; its `dropped` counts lost ones.
+        buffer: buffer of values for the peer. Its `dropped` counts lost values.
         sent: number of values that the peer accepted.
         refused: number of values that the peer refused, for example with a full buffer.
 
@@ -487,9 +497,9 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         """Take a value from the OutPort.
 
         Returns:
-            INVALID_ARGS if the value cannot be encoded; the status of the buffer, if that is not
-            PORT_OK; else the peer's status for the latest value sent to it: PORT_OK, an error such
-            as BUFFER_FULL, or CONNECTION_LOST if the peer did not answer.
+            INVALID_ARGS if the value cannot be encoded. The status of the buffer, if that is not
+            PORT_OK. Otherwise the peer's status for the latest value sent to it: PORT_OK, an error
+            such as BUFFER_FULL, or CONNECTION_LOST if the peer did not answer.
         """
         try:
             payload = self._codec.encode(value)
@@ -498,7 +508,7 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         return (self._publisher or self.buffer).write(payload) or self._watch.status
 
     def _send(self) -> float | None:
-        """Put the oldest value, in the thread of the peer."""
+        """Put the oldest value in the thread of the peer."""
         taken = self.buffer.take()
         if not taken or not self.joined:
             return None
@@ -517,12 +527,12 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
 
 
 class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
-    """Holds values of an OutPort until a peer takes them.
+    """A connector that holds values of an OutPort until a peer takes them.
 
     Args:
-        port: the local port.
-        end: the settings agreed with the peer.
-        codec: encodes the values.
+        port: local port of the connector.
+        end: settings agreed with the peer.
+        codec: codec that encodes the values.
 
     Raises:
         RtcRefused: the port has a connector with this ID, or the properties are not possible.
@@ -536,7 +546,7 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         self.buffer, self._codec = _LockedBuffer(options.outport), codec
 
     def write(self, value: T) -> PortStatus:
-        """Take a value from the OutPort; INVALID_ARGS if it cannot be encoded."""
+        """Take a value from the OutPort. Return INVALID_ARGS if it cannot be encoded."""
         try:
             payload = self._codec.encode(value)
         except ValueError:
@@ -547,8 +557,8 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         """Take the next value, in any thread.
 
         Returns:
-            PORT_OK and the encoded value; else None with BUFFER_EMPTY, or with CONNECTION_LOST
-            after the end of the connector.
+            PORT_OK and the encoded value. Without a value, None with BUFFER_EMPTY, or with
+            CONNECTION_LOST after the end of the connector.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

@@ -1,4 +1,4 @@
-"""A device's place in a system: its proxy while it is there, a search for it while it is not."""
+"""A device in a system: its proxy while the device is present, or else a search for the device."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from tickrig.wire.rtc_lite.frame import Framing
 
 
 class _DeviceWatcher:
-    """Requests the state of a device every 100 ticks, without waiting for the answers.
+    """A watcher that requests the state of a device every 100 ticks, without waiting for answers.
 
     Args:
-        link: the line to the device.
-        settings: interval of the requests, and the time limit for an answer.
+        link: line to the device.
+        settings: settings with the interval of the requests, and the time limit for an answer.
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
@@ -38,12 +38,12 @@ class _DeviceWatcher:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do, on the clock of the link."""
+        """Time at which `tick` has work to do, on the clock of the link."""
         now_us = self._channel.now_us
         return min(self._next_us, now_us + POLL_US) if now_us < self._answer_us else self._next_us
 
     def tick(self) -> bool:
-        """Ask, if it is time to; return whether the device has answered."""
+        """Request the state if that is due. Return whether the device has answered."""
         self._channel.poll()
         if self._channel.state is None and self._channel.now_us >= self._next_us:
             self._channel.send(LiteCommand.STATE)
@@ -53,26 +53,26 @@ class _DeviceWatcher:
 
 
 _RATE_HZ: Final = 10.0
-"""A period that two round trips at 57600 bit/s do not fill."""
+"""Rate whose period two round trips at 57600 bit/s do not fill."""
 
 _LOG: Final = log_of(__name__)
 
 
 @dataclass(slots=True)
 class Attachment:
-    """Sends the PINGs of a proxy, removes it if its device is lost, and searches for the device.
+    """Upkeep of a proxy: sending PINGs, removing the proxy of a lost device, searching the device.
 
-    The manager ticks it. It ends if other code deletes its proxy.
+    The manager ticks the attachment. It ends if other code deletes its proxy.
 
     Attributes:
         manager: manager of the system.
-        link: the line to the device; it stays open.
-        base_name: name of the proxy, without its number.
-        settings: time limits, and whether to search for the device.
-        listener: called with events.
-        context: execution context of the proxy; None for its own.
-        rate_hz: rate of its own context.
-        proxy: the latest one.
+        link: line to the device, which stays open.
+        base_name: name of the proxy without its number.
+        settings: settings with time limits, and whether to search for the device.
+        listener: function that is called with events.
+        context: execution context of the proxy, or None for a context of its own.
+        rate_hz: rate of the proxy's own context.
+        proxy: latest proxy of the device.
 
     Raises:
         RtcRefused: the device does not start up.
@@ -90,17 +90,17 @@ class Attachment:
     _watcher: _DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
 
     def __post_init__(self) -> None:
-        """Make the first proxy, and have the manager tick this."""
+        """Make the first proxy, and make the manager tick this attachment."""
         self.proxy = self._add_proxy()
         self.manager.add_item(self)
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do, as the manager counts time; its clock may be another."""
+        """Time at which `tick` has work to do, on the clock of the manager, which may differ."""
         return self.manager.now_us + max(0, self._link_due_us - self.link.now_us)
 
     def tick(self, now_us: int) -> None:
-        """Mind the proxy, or look for the device."""
+        """Check the proxy, or search for the device."""
         if self._watcher is not None:
             if self._watcher.tick():
                 self.manager.defer(self._return)
@@ -139,7 +139,7 @@ class Attachment:
             self.manager.remove_item(self)
 
     def _return(self) -> None:
-        """Make a new proxy for a device that has answered, and so need not be waited for."""
+        """Make a new proxy for a device that has answered, so that no waiting is necessary."""
         self.settings = replace(self.settings, boot_us=0)
         try:
             self.proxy, self._watcher = self._add_proxy(), None
@@ -165,17 +165,17 @@ def attach(  # noqa: PLR0913 - options, by keyword
     context: ExecutionContext | None = None,
     rate_hz: float = _RATE_HZ,
 ) -> RtcLiteProxy:
-    """Add a proxy to a system, named with the lowest number that is free: `LiteA0`.
+    """Add a proxy to a system. Its name has the lowest free number, such as `LiteA0`.
 
     Args:
-        manager: manager of the system; it sends the PINGs, removes the proxy and finds the device
+        manager: manager of the system. It sends the PINGs, removes the proxy and finds the device
             again.
-        link: the line to the device.
-        base_name: name of the proxy, without its number.
-        settings: time limits, checksum, rediscovery.
-        listener: called with events.
-        context: execution context of the proxy; if left out, the proxy gets its own.
-        rate_hz: rate of its own execution context.
+        link: line to the device.
+        base_name: name of the proxy without its number.
+        settings: settings with time limits, checksum and rediscovery.
+        listener: function that is called with events.
+        context: execution context of the proxy. By default, the proxy gets its own.
+        rate_hz: rate of the proxy's own execution context.
 
     Raises:
         RtcRefused: the device does not start up.
@@ -200,14 +200,14 @@ _WORD: Final = re.compile(r"([A-Za-z]\w*)=([^,]+?)(?:@(\d{1,8}))?((?:,[^,]*)*)",
 def attach_lite(
     manager: Manager, word: str, stack: ExitStack, boot_us: int, rate_hz: float | None
 ) -> None:
-    """Open a device's line and add its proxy, which returns when the device returns.
+    """Open a device's line and add its proxy. The proxy returns when the device returns.
 
     Args:
         manager: manager of the system.
-        word: `NAME=URL[@BAUD][,rtno][,boot=TIME]`; the proxy is `NAME0`.
-        stack: closes the line.
+        word: word `NAME=URL[@BAUD][,rtno][,boot=TIME]`. The proxy is `NAME0`.
+        stack: exit stack that closes the line.
         boot_us: pause after the line is opened, unless the word has `boot`.
-        rate_hz: rate of the proxy; 10 Hz if None.
+        rate_hz: rate of the proxy, or None for 10 Hz.
 
     Raises:
         Refused: the word or the line is invalid, or no device answers.
@@ -221,7 +221,7 @@ def attach_lite(
 
 
 def _parse_lite(word: str, boot_us: int = 0) -> tuple[str, str, int, ProxySettings]:
-    """Read name, URL, bit rate and settings; Refused if the word has another form.
+    """Read name, URL, bit rate and settings. Raise Refused if the word has another form.
 
     >>> _parse_lite("LiteA=/dev/ttyUSB0")[:3], _parse_lite("B=socket://localhost:7000@9600")[:3]
     (('LiteA', '/dev/ttyUSB0', 57600), ('B', 'socket://localhost:7000', 9600))

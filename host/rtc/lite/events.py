@@ -1,4 +1,4 @@
-"""What a proxy tells beside its state."""
+"""The events and statistics of a proxy besides its state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tickrig.wire.instant import NEVER
 # When to send a PING, when a device is lost (DECISION L14), and how PINGs went.
 
 _SEQUENCE: Final = range(1, 256)
-"""Numbers of PINGs; 0 is skipped."""
+"""Numbers of PINGs, in which 0 is skipped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +24,11 @@ class PingStatistics:
 
     Attributes:
         sent: number of PINGs sent.
-        answered: number of these that were answered in time.
-        lost: number of these that were not answered in time; the others are still under way.
-        shortest_us: shortest round trip; 0 without a round trip.
-        longest_us: longest round trip; 0 without a round trip.
+        answered: number of PINGs that were answered in time.
+        lost: number of PINGs that were not answered in time. The remaining PINGs are still under
+            way.
+        shortest_us: shortest round trip, or 0 without a round trip.
+        longest_us: longest round trip, or 0 without a round trip.
         total_us: sum of all round trips.
     """
 
@@ -40,11 +41,11 @@ class PingStatistics:
 
     @property
     def mean_us(self) -> int:
-        """Mean round trip, 0 without one."""
+        """Mean round trip, or 0 without a round trip."""
         return self.total_us // self.answered if self.answered else 0
 
     def __str__(self) -> str:
-        """Write it for people.
+        """Return the statistics as text for the user.
 
         >>> str(PingStatistics(5, 4, 1, 3_900, 5_000, 17_000))
         'PINGs: 5 sent, 4 answered, 1 lost; round trip 3.9/4.2/5.0 ms (min/mean/max)'
@@ -59,21 +60,21 @@ class PingStatistics:
 
 @dataclass(slots=True)
 class PingMonitor:
-    """Schedules and counts PINGs. It sends nothing, and has no clock.
+    """A monitor that schedules and counts PINGs. It sends nothing, and has no clock.
 
-    From `start` on a PING is due each `period_us`, regardless of other traffic. A PING delayed by a
-    busy line does not shift the next one, and a burst does not shift it either. PINGs that fall due
-    during a burst are part of the burst.
+    From `start` on, a PING is due each `period_us`, regardless of other traffic. Neither a PING
+    delayed by a busy line nor a burst shifts the next PING. PINGs that fall due during a burst are
+    part of the burst.
 
     Args:
-        period_us: from one PING to the next.
-        wait_us: how long an answer may take.
-        most: number of unanswered PINGs in a row after which the device is lost.
+        period_us: time from one PING to the next.
+        wait_us: longest time until an answer.
+        most: number of successive unanswered PINGs after which the device is lost.
 
     Attributes:
         awaiting: whether a PING waits for its answer.
         doubted: whether a reply is missing and no PING has been answered since then.
-        lost: whether the device no longer answers; this is final.
+        lost: whether the device no longer answers, which is final.
     """
 
     period_us: int
@@ -95,7 +96,7 @@ class PingMonitor:
 
     @property
     def statistics(self) -> PingStatistics:
-        """How the PINGs went up to now."""
+        """Statistics of the PINGs up to now."""
         return PingStatistics(
             self._sent,
             self._answered,
@@ -107,22 +108,22 @@ class PingMonitor:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do; `NEVER` for a device that is lost."""
+        """Time at which `tick` has work to do, or `NEVER` for a device that is lost."""
         if self.lost:
             return NEVER
         return self._pinged_us + self.wait_us if self.awaiting else self._next_us
 
     @property
     def pending(self) -> bool:
-        """Whether an answer is out to a PING that was sent as a matter of routine."""
+        """Whether a routine PING waits for its answer."""
         return self.awaiting and not self.doubted
 
     def start(self, now_us: int) -> None:
-        """Let the first PING be due a period from now."""
+        """Schedule the first PING a period from now."""
         self._next_us = now_us + self.period_us
 
     def tick(self, now_us: int) -> int | None:
-        """Return the number of a PING that is to be sent now, if one is."""
+        """Return the number of a PING to send now, or nothing."""
         if now_us < self.due_us:
             return None
         if self.awaiting:
@@ -132,23 +133,23 @@ class PingMonitor:
         return None if self.lost else self._ping(now_us)
 
     def doubt(self, now_us: int) -> int:
-        """Begin a burst, as a reply is missing; return the number of its first PING."""
+        """Begin a burst because a reply is missing. Return the number of its first PING."""
         self.doubted = True
         return self._ping(now_us)
 
     def let_go(self) -> None:
-        """Wait no more for a routine PING: a request follows, whose reply tells as much."""
+        """Stop waiting for a routine PING, because the reply to a request proves as much."""
         if self.pending:
             self.awaiting = False
             self._missed += 1
 
     def replied(self) -> None:
-        """Note that the device has replied to a request: it is there."""
+        """Record that the device has replied to a request, so that it is present."""
         if not self.awaiting:
             self._unanswered = 0
 
     def answered(self, number: int, now_us: int) -> None:
-        """Take an answer; that to an older PING is ignored."""
+        """Process an answer. An answer to an older PING is ignored."""
         if self.awaiting and number == self._number:
             round_trip_us = now_us - self._pinged_us
             first = not self._answered
@@ -162,7 +163,7 @@ class PingMonitor:
             self._unanswered = 0
 
     def _ping(self, now_us: int) -> int:
-        """Count a PING that is sent now, and return its number."""
+        """Count a PING that is sent now. Return its number."""
         self._advance(now_us)
         self._number = self._number % _SEQUENCE[-1] + 1
         self._unanswered += 1
@@ -171,7 +172,7 @@ class PingMonitor:
         return self._number
 
     def _advance(self, now_us: int) -> None:
-        """Pass over what has fallen due."""
+        """Skip the PINGs that have fallen due."""
         if self._next_us <= now_us:
             self._next_us += (now_us - self._next_us) // self.period_us * self.period_us
             self._next_us += self.period_us
@@ -181,7 +182,7 @@ _LOG: Final = log_of(__name__)
 
 
 class ProxyEventType(StrEnum):
-    """What happened."""
+    """Type of an event of a proxy."""
 
     PASSIVE_ERROR = "PassiveError"  # the device reported an error, or one reply was lost
     FATAL_ERROR = "FatalError"  # no answer to any PING: power cut, dead link
@@ -191,15 +192,15 @@ class ProxyEventType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ProxyEvent:
-    """Something that happened to a proxy.
+    """An event of a proxy.
 
     Attributes:
         at_us: time of the event on the clock of the proxy's link.
         kind: kind of the event.
         instance_name: name of the proxy.
-        reason: why the proxy went to Error, for people; empty for other events.
-        frames: the last frames before the event, with their times on the clock of the link.
-        pings: statistics of its PINGs; None unless the proxy was removed.
+        reason: reason for the move to Error as text, empty for other events.
+        frames: last frames before the event, with their times on the clock of the link.
+        pings: statistics of the proxy's PINGs, or None unless the proxy was removed.
     """
 
     at_us: int
@@ -210,7 +211,7 @@ class ProxyEvent:
     pings: PingStatistics | None = None
 
     def __str__(self) -> str:
-        """Write it in a line for people."""
+        """Return the event as one line for the user."""
         why = f": {self.reason}" if self.reason else ""
         frames = f"; last frames: {', '.join(self.frames)}" if self.frames else ""
         pings = f"; {self.pings}" if self.pings else ""
@@ -218,7 +219,7 @@ class ProxyEvent:
 
 
 ProxyListener = Callable[[ProxyEvent], None]
-"""Called with events; an exception in it is logged and has no other effect."""
+"""Function that is called with events. Its exceptions are logged and have no other effect."""
 
 
 def notify(listener: ProxyListener | None, event: ProxyEvent) -> None:

@@ -1,4 +1,4 @@
-"""The proxy: an ordinary RT component to everybody else, whose work a small device does."""
+"""The proxy, which is an ordinary RT component whose work a small device does."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class DeviceProfile:
     """The profile that a device reports.
 
     Attributes:
-        type_name: type of its component.
-        in_ports: its in-ports.
-        out_ports: its out-ports.
-        context: kind of the execution context that executes it.
+        type_name: type of the component on the device.
+        in_ports: in-ports of the device.
+        out_ports: out-ports of the device.
+        context: kind of the execution context that executes the component.
     """
 
     type_name: str
@@ -43,12 +43,12 @@ class DeviceProfile:
 
     @property
     def properties(self) -> dict[str, str]:
-        """What the profile of its proxy says of it."""
+        """Properties of the device in the profile of its proxy."""
         return {"rtc_lite.type_name": self.type_name, "rtc_lite.context": f"0x{self.context:02X}"}
 
 
 def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
-    """Bring a device to Inactive, and read its profile.
+    """Bring a device to Inactive and read its profile.
 
     Raises:
         LinkTimeout: the device does not reply.
@@ -93,7 +93,7 @@ def _request_context(channel: RequestChannel) -> LiteContextType:
 
 
 def _demand(command: LiteCommand, reply: messages.LiteReply | None) -> messages.LiteReply:
-    """Return a reply that is there and OK."""
+    """Return a reply that exists and is OK."""
     name = command.value.decode()
     if reply is None:
         raise LinkTimeout(f"no reply to {name}")
@@ -120,7 +120,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
 
 @dataclass(frozen=True, slots=True)
 class _InPortBridge:
-    """An InPort of the proxy, and the in-port of the device behind it."""
+    """An InPort of the proxy, with the in-port of the device that it feeds."""
 
     port: InPort[Any]
     name: bytes
@@ -128,12 +128,12 @@ class _InPortBridge:
 
     @classmethod
     def of(cls, profile: messages.LitePortProfile) -> _InPortBridge:
-        """Make the InPort of an in-port; DeviceRefused if its type is not known."""
+        """Make the InPort of an in-port. Raise DeviceRefused if its type is unknown."""
         name, port_type = _read(profile)
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
 
     def take(self) -> messages.LitePortData | None:
-        """Return the oldest unread value, if there is one.
+        """Return the oldest unread value, or None.
 
         Raises:
             FieldError: the value is not in the range of its type, or does not fit into a frame.
@@ -151,19 +151,19 @@ class _InPortBridge:
 
 @dataclass(frozen=True, slots=True)
 class _OutPortBridge:
-    """An OutPort of the proxy, and the out-port of the device behind it."""
+    """An OutPort of the proxy, with the out-port of the device that feeds it."""
 
     port: OutPort[Any]
     port_type: LitePortType[Any]
 
     @classmethod
     def of(cls, profile: messages.LitePortProfile) -> _OutPortBridge:
-        """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
+        """Make the OutPort of an out-port. Raise DeviceRefused if its type is unknown."""
         name, port_type = _read(profile)
         return cls(OutPort(name, _KINDS[port_type.name]), port_type)
 
     def give(self, data: bytes, now_us: int) -> None:
-        """Write a value that arrived; FieldError if it is not of the port's type."""
+        """Write a value that arrived. Raise FieldError if its type is not that of the port."""
         kind = self.port.data_type
         value = self.port_type.decode(data)
         if kind is rtc.TimedOctetSeq:
@@ -187,15 +187,15 @@ _PORTS_LOG: Final = log_of(__name__)
 class PortBridges:
     """The ports of a proxy, made from the profile of its device.
 
-    A value that does not fit the device, and data that fit no port, are logged and dropped: they do
+    A value that does not fit the device, and data that fit no port, are logged and dropped. They do
     not stop the proxy.
 
     Args:
-        ins: the in-ports of the device.
-        outs: its out-ports.
+        ins: in-ports of the device.
+        outs: out-ports of the device.
 
     Attributes:
-        dropped: how many values were dropped.
+        dropped: number of values that were dropped.
 
     Raises:
         DeviceRefused: a port has an unknown type.
@@ -212,7 +212,7 @@ class PortBridges:
 
     @property
     def ports(self) -> Iterator[AnyPort]:
-        """The InPorts, then the OutPorts."""
+        """The InPorts followed by the OutPorts."""
         return chain((relay.port for relay in self._ins), (r.port for r in self._outs.values()))
 
     def fresh(self) -> Iterator[messages.LitePortData]:
@@ -227,7 +227,7 @@ class PortBridges:
                     yield data
 
     def give(self, at_us: int, data: messages.LitePortData) -> None:
-        """Write to an OutPort what arrived from the device."""
+        """Write data from the device to an OutPort."""
         if (relay := self._outs.get(data.name)) is None:
             self._drop("an out-port that was not described", repr(data.name))
             return
@@ -242,7 +242,7 @@ class PortBridges:
 
 
 _MIRROR_US: Final = 100_000
-"""How often the state of a device is asked that executes by its own timer: each 10th tick."""
+"""Interval of state requests to a device with its own timer, which is every 10th tick."""
 
 _MAX_RATE_HZ: Final = 0xFFFF
 
@@ -254,37 +254,37 @@ _CODES: Final[dict[int, ReturnCode]] = {
     LiteStatus.NO_OUT_PORT: ReturnCode.BAD_PARAMETER,
     LiteStatus.UNSUPPORTED: ReturnCode.UNSUPPORTED,
 }
-"""What a callback returns for a status; RTC_ERROR for any other, and without a reply."""
+"""Results of a callback by status. Any other status, or no reply, is RTC_ERROR."""
 
 _TO_INACTIVE: Final = {
     LiteState.CREATED: LiteCommand.INITIALIZE,
     LiteState.ACTIVE: LiteCommand.ABORT,
     LiteState.ERROR: LiteCommand.RESET,
 }
-"""What brings a device one step nearer to Inactive, on_reset of the proxy."""
+"""Request that brings a device one step nearer to Inactive, for on_reset of the proxy."""
 
 _LOG: Final = log_of(__name__)
 
 
 class RtcLiteProxy(RtComponent):
-    """Represents an RTC-Lite component (Suzuki et al., RSJ 2007).
+    """An RT component that represents an RTC-Lite component (Suzuki et al., RSJ 2007).
 
     Each callback sends the request of the same name to the device, and waits for the reply within
-    the period, 100 ms at most. So input data affect the output of the same period. Call `tick` at
-    `due_us`, so that PINGs are sent; `attach` arranges this.
+    the period, 100 ms at most. Therefore input data affect the output of the same period. Call
+    `tick` at `due_us`, so that PINGs are sent. `attach` arranges this.
 
     Not emulated: service ports and configuration sets, which RTC-Lite does not have.
 
     Args:
-        instance_name: unique in a system.
-        link: the line to the device. Its clock is that of the proxy.
-        settings: time limits and checksum.
-        listener: called with events.
+        instance_name: name that is unique in a system.
+        link: line to the device. Its clock is the clock of the proxy.
+        settings: settings with time limits and checksum.
+        listener: function that is called with events.
 
     Attributes:
-        device: the profile of the device; None before `on_initialize`.
-        relays: its ports; there are none before `on_initialize`.
-        fatal_us: when the device was lost; None while it answers.
+        device: profile of the device, or None before `on_initialize`.
+        relays: ports of the proxy. There are none before `on_initialize`.
+        fatal_us: time at which the device was lost, or None while it answers.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec(
@@ -312,28 +312,28 @@ class RtcLiteProxy(RtComponent):
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do, on the clock of the link."""
+        """Time at which `tick` has work to do, on the clock of the link."""
         return self._channel.due_us
 
     @property
     def device_state(self) -> LiteState | None:
-        """Last reported state of the device; None if unknown."""
+        """Last reported state of the device, or None if unknown."""
         return self._channel.state
 
     @property
     def profile(self) -> ComponentProfile:
-        """The component as it is, with the type of the one on the device and its PINGs."""
+        """Profile of the component, with the type of the device's component and its PINGs."""
         pings = {"rtc_lite.pings": str(self.pings).removeprefix("PINGs: ")}
         properties = {} if self.device is None else {**self.device.properties, **pings}
         return replace(super().profile, properties=properties)
 
     @property
     def pings(self) -> events.PingStatistics:
-        """How the PINGs went since `on_initialize`."""
+        """Statistics of the PINGs since `on_initialize`."""
         return self._channel.ping_monitor.statistics
 
     def tick(self) -> None:
-        """Send PINGs and look for their answers; a device that is lost leads to Error."""
+        """Send PINGs and read their answers. A lost device leads to Error."""
         self._channel.tick()
         if self._channel.ping_monitor.lost and self.fatal_us is None:
             self.fatal_us, self._unreported = self._channel.now_us, False
@@ -345,7 +345,7 @@ class RtcLiteProxy(RtComponent):
                 context.abort_component(self)
 
     def on_initialize(self) -> ReturnCode:
-        """Bring the device to Inactive, and make a port of each of its ports."""
+        """Bring the device to Inactive, and make a port for each of its ports."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
         self._channel = RequestChannel(self._link, self._settings)
@@ -365,15 +365,15 @@ class RtcLiteProxy(RtComponent):
         return self._command(LiteCommand.FINALIZE)
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
-        """Tell a device that wants to know."""
+        """Notify a device that wants to know."""
         return self._optional(LiteCommand.STARTUP)
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
-        """Tell a device that wants to know."""
+        """Notify a device that wants to know."""
         return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """Set the nearest whole rate in a device that executes by its own timer."""
+        """Set the nearest whole rate in a device with its own timer."""
         if not self._by_timer:
             return _OK
         rate_hz = min(max(1, round(ec.rate_hz)), _MAX_RATE_HZ)
@@ -386,13 +386,13 @@ class RtcLiteProxy(RtComponent):
         return code
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Deactivate the device, unless Error comes next: it is aborted then."""
+        """Deactivate the device. If Error comes next, the device is aborted later instead."""
         code = _OK if self._failed else self._command(LiteCommand.DEACTIVATE)
         self._write_out_ports()
         return code
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Hand data in, let the device execute, and hand data out."""
+        """Send input data, let the device execute, and receive output data."""
         code = _OK if self._mute else self._write_in_ports()
         if code is _OK:
             code = self._mirror(ec.now_us) if self._by_timer else self._command(LiteCommand.EXECUTE)
@@ -401,7 +401,7 @@ class RtcLiteProxy(RtComponent):
         return code
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
-        """Let the device follow into Error, if it is not there."""
+        """Move the device to Error too, if it is not in Error."""
         self._unreported = self.fatal_us is None
         if self._unreported:
             self._why = self._channel.trouble or "it was commanded to abort", self._channel.frames
@@ -409,7 +409,7 @@ class RtcLiteProxy(RtComponent):
         return self._follow()
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Let the device run on_error; one whose reply was lost is made to follow first."""
+        """Let the device run on_error. If its reply was lost, move the device to Error first."""
         self._notify_passive()
         code = self._follow()
         if self._channel.state is LiteState.ERROR and not self._by_timer:
@@ -418,7 +418,7 @@ class RtcLiteProxy(RtComponent):
         return code
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Bring the device to Inactive, from whatever state it is in."""
+        """Bring the device to Inactive from any state."""
         for _ in _TO_INACTIVE:  # no state is passed twice
             state = self._known_state()
             step = None if state is None else _TO_INACTIVE.get(state)
@@ -432,21 +432,21 @@ class RtcLiteProxy(RtComponent):
 
     @property
     def _mute(self) -> bool:
-        """Whether a device that executes by itself is left alone until it answers a PING."""
+        """Whether a self-executing device gets no requests until it answers a PING."""
         return self._by_timer and self._channel.ping_monitor.doubted
 
     def _command(self, command: LiteCommand, data: bytes = b"") -> ReturnCode:
         return _code_of(self._channel.request(command, data))
 
     def _optional(self, command: LiteCommand) -> ReturnCode:
-        """Ask for a callback that a device may leave out; that is no trouble."""
+        """Request a callback that a device need not have. Its absence is not a fault."""
         if (code := self._command(command)) is not ReturnCode.UNSUPPORTED:
             return code
         self._channel.trouble = ""
         return _OK
 
     def _known_state(self) -> LiteState | None:
-        """Return the state of the device; request it if it is unknown."""
+        """Return the state of the device. Request the state if it is unknown."""
         if self._channel.state is None:
             self._channel.request(LiteCommand.STATE)
         return self._channel.state
@@ -457,7 +457,10 @@ class RtcLiteProxy(RtComponent):
         return _OK
 
     def _mirror(self, now_us: int) -> ReturnCode:
-        """Ask once in 10 ticks whether the device is still Active; up to 3 times in vain."""
+        """Request once in 10 ticks whether the device is still Active.
+
+        Repeat up to 3 times in vain.
+        """
         if self._mute or now_us // _MIRROR_US == self._mirrored:
             self._channel.poll()
             return _OK
@@ -480,13 +483,13 @@ class RtcLiteProxy(RtComponent):
         return _OK
 
     def _write_out_ports(self) -> None:
-        """Write to the OutPorts what has arrived."""
+        """Write the received data to the OutPorts."""
         pushed, self._channel.pushed = self._channel.pushed, []
         for at_us, data in pushed:
             self.relays.give(at_us, data)
 
     def _notify_passive(self) -> None:
-        """Report an error once it is known that the device answers."""
+        """Report an error when it is known that the device answers."""
         if self._unreported and not self._channel.ping_monitor.doubted:
             self._unreported = False
             self._notify(events.ProxyEventType.PASSIVE_ERROR)

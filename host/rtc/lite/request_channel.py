@@ -26,18 +26,20 @@ from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
 @dataclass(frozen=True, slots=True)
 class ProxySettings:
-    """How a proxy talks to its device, and what happens if the device is lost.
+    """The communication settings of a proxy, and its reaction to a lost device.
 
     Attributes:
-        framing: frames of RTC-Lite, or packets of RTno (bridge mode).
-        checksum: checksum of frames (DECISION L5); packets of RTno always use `sum8`.
-        boot_us: pause after the link was opened; 3 s for boards that reset when the port is opened.
-        reply_us: how long a reply may take, 1 us or more (DECISION L13).
-        ping_period_us: from one PING to the next, regardless of other traffic, 1 us or more
+        framing: protocol on the line, which is frames of RTC-Lite, or packets of RTno (bridge
+            mode).
+        checksum: checksum of frames (DECISION L5). Packets of RTno always use `sum8`.
+        boot_us: pause after the link was opened. Use 3 s for boards that reset when the port is
+            opened.
+        reply_us: longest time until a reply, 1 us or more (DECISION L13).
+        ping_period_us: time from one PING to the next, regardless of other traffic, 1 us or more
             (DECISION L14).
         pings: number of unanswered PINGs after which a device is lost, 1 or more.
-        linger_us: how long a proxy stays in Error after that (DECISION L15).
-        rediscover: whether to search for the device afterwards.
+        linger_us: time that a proxy stays in Error after the loss of its device (DECISION L15).
+        rediscover: whether to search for the device after its loss.
         search_period_us: interval of the search, 1 us or more.
 
     Raises:
@@ -55,7 +57,7 @@ class ProxySettings:
     search_period_us: int = 1_000_000
 
     def __post_init__(self) -> None:
-        """Refuse invalid settings."""
+        """Raise ValueError for invalid settings."""
         if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
         at_least = {"boot_us": 0, "linger_us": 0}
@@ -75,27 +77,27 @@ class ProxySettings:
 # Frames over a byte link: those of RTC-Lite, or packets of RTno in their place.
 
 _SILENCE_US: Final = 20_000
-"""Silence after which the rest of a broken frame is not waited for."""
+"""Silence after which the rest of a broken frame is no longer expected."""
 
 _KEPT: Final = 8
-"""Frames that are kept, for who wants to know what was said last."""
+"""Number of frames that are kept, so that a report can show the last frames."""
 
 _FRAMES_LOG: Final = log_of(__name__)
 
 
 class _ReplyDecoder(Protocol):
-    """`Decoder` or `RtnoReplies`."""
+    """Type of a decoder, which is `Decoder` or `RtnoReplies`."""
 
     @property
     def lost(self) -> bool:
-        """Whether all is thrown away until `clear`."""
+        """Whether all bytes are dropped until `clear`."""
         ...
 
     def clear(self) -> None:
-        """Look for a header again."""
+        """Search for a header again."""
 
     def push(self, data: bytes, /) -> list[LiteFrame | codes.LiteLinkFault]:
-        """Take bytes in; give frames and faults out."""
+        """Take received bytes. Return frames and faults."""
         ...
 
 
@@ -103,16 +105,16 @@ class _FrameLink:
     """A `Link[LiteFrame]` that sends requests and receives replies.
 
     A closed line behaves like a device without power. Bytes that are not a frame are skipped. After
-    an unknown command the search for the next header starts at once, because the checksum
+    an unknown command, the search for the next header starts at once, because the checksum
     identifies a frame.
 
     Args:
-        link: the line.
-        encode: encodes a request.
-        decoder: reads the replies.
+        link: line to the device.
+        encode: function that encodes a request.
+        decoder: decoder that reads the replies.
 
     Attributes:
-        latest: the last frames with their times, such as `1.234 > CX`, `1.238 < CX@I`.
+        latest: last frames with their times, such as `1.234 > CX`, `1.238 < CX@I`.
     """
 
     def __init__(
@@ -128,7 +130,7 @@ class _FrameLink:
         return self._link.now_us
 
     def send(self, frame: LiteFrame) -> None:
-        """Send a frame; a broken one that came long before is not waited for any more."""
+        """Send a frame. The rest of an old broken frame is no longer expected."""
         if self.now_us - self._byte_us >= _SILENCE_US:
             self._decoder.clear()
         self._note(">", frame)
@@ -138,7 +140,7 @@ class _FrameLink:
             _FRAMES_LOG.debug("not sent: %s", error)
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
-        """Wait for bytes, and return the frames that they complete; None if the line is gone."""
+        """Wait for bytes. Return the frames that they complete, or None if the line is gone."""
         try:
             data = self._link.receive(timeout_us)
         except LinkError as error:
@@ -159,7 +161,7 @@ class _FrameLink:
 
 
 class _RtnoLink(_FrameLink):
-    """Sends the requests for which RTno has a letter, and replaces the others.
+    """A link that sends the requests for which RTno has a letter, and replaces the other requests.
 
     | request | replacement |
     |---|---|
@@ -168,7 +170,7 @@ class _RtnoLink(_FrameLink):
     | initialize, finalize, on_startup, on_shutdown, rate, poll | nothing; the reply is `!` |
 
     Args:
-        link: the line.
+        link: line to the device.
     """
 
     def __init__(self, link: Link[bytes]) -> None:
@@ -178,7 +180,7 @@ class _RtnoLink(_FrameLink):
         self._made_up: list[LiteFrame] = []
 
     def send(self, frame: LiteFrame) -> None:
-        """Send a request, or what stands for it."""
+        """Send a request, or its replacement."""
         self._aborts = frame.command is codes.LiteCommand.ABORT
         if frame.command is codes.LiteCommand.PING:
             self._ping = frame.data
@@ -191,7 +193,7 @@ class _RtnoLink(_FrameLink):
             self._made_up.append(LiteFrame(frame.command, bytes([codes.LiteStatus.UNSUPPORTED])))
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
-        """Wait for bytes, and return the frames that they complete; None if the line is gone."""
+        """Wait for bytes. Return the frames that they complete, or None if the line is gone."""
         made_up, self._made_up = self._made_up, []
         frames = super().receive(0 if made_up else timeout_us)
         if frames is None:
@@ -213,13 +215,13 @@ POLL_US: Final = 1_000
 """Polling interval for the answer to a PING."""
 
 _PROFILE_US: Final = 10_000_000
-"""How long all frames of a profile may take (RTnoProxy)."""
+"""Longest time for all frames of a profile (RTnoProxy)."""
 
 _FAULTS: Final = frozenset(codes.FAULT_COMMANDS)
-"""What stands in the place of a status when a device could not read a request."""
+"""Codes in place of a status if a device could not read a request."""
 
 RETRIES: Final = 3
-"""For requests that may be repeated (DECISION L13)."""
+"""Number of repetitions of requests that may be repeated (DECISION L13)."""
 
 _MEANINGS: Final[Mapping[int, str]] = {
     codes.LiteStatus.ERROR: "x: a callback failed",
@@ -239,21 +241,22 @@ _LOG: Final = log_of(__name__)
 class RequestChannel:
     """The requests of a proxy, and their replies.
 
-    `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs. It
-    does not block: `tick` continues it. During the burst, and after a device was lost, no requests
-    are sent. The device answers in order, so after an answered PING no late reply can follow.
+    `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs,
+    which `tick` continues without blocking. During the burst, and after a device was lost, no
+    requests are sent. The device answers in order, so after an answered PING no late reply can
+    follow.
 
     Args:
-        link: the line to the device.
-        settings: time limits and checksum.
+        link: line to the device.
+        settings: settings with time limits and checksum.
 
     Attributes:
-        ping_monitor: schedules and counts the PINGs.
-        state: state of the device according to its replies; None if unknown.
+        ping_monitor: monitor that schedules and counts the PINGs.
+        state: state of the device according to its replies, or None if unknown.
         pushed: data of out-ports that were not taken yet, with their time of arrival.
         in_ports: in-ports that the device described.
-        out_ports: out-ports that it described.
-        trouble: why the last request failed; empty if it succeeded.
+        out_ports: out-ports that the device described.
+        trouble: reason why the last request failed, empty if it succeeded.
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
@@ -270,7 +273,7 @@ class RequestChannel:
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """The last frames with their times, as `1.234 > CX`, `1.238 < CX@I`."""
+        """The last frames with their times, such as `1.234 > CX`, `1.238 < CX@I`."""
         return tuple(self._line.latest)
 
     @property
@@ -280,15 +283,15 @@ class RequestChannel:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do."""
+        """Time at which `tick` has work to do."""
         due_us = self.ping_monitor.due_us
         return min(due_us, self._polled_us + POLL_US) if self.ping_monitor.awaiting else due_us
 
     def tick(self) -> None:
-        """Read the received frames, and send a PING if one is due.
+        """Read the received frames. Send a PING if one is due.
 
-        All received frames are read before a PING is judged overdue. So a late call of this method
-        does not make a device count as lost.
+        All received frames are read before a PING is judged overdue. Therefore a late call of this
+        method does not make a device count as lost.
         """
         now_us = self.now_us
         self.poll()
@@ -296,7 +299,9 @@ class RequestChannel:
             self._ping(number)
 
     def request(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
-        """Send a request and wait for its reply; None without a reply, or if it may not be sent.
+        """Send a request and wait for its reply.
+
+        The result is None without a reply, or if the request may not be sent.
 
         If a PING is due, the PING is sent first.
         """
@@ -312,9 +317,10 @@ class RequestChannel:
         return reply
 
     def request_again(self, command: codes.LiteCommand) -> messages.LiteReply | None:
-        """Send a request until it is answered, 4 times at most; a missing reply has no effect.
+        """Send a request until it is answered, at most 4 times. A missing reply has no effect.
 
-        A fault reply is not an answer: earlier bytes on the line have corrupted the request.
+        A fault reply is not an answer, because earlier bytes on the line have corrupted the
+        request.
         """
         reply = self._exchange(command)
         for _ in range(RETRIES):
@@ -326,11 +332,11 @@ class RequestChannel:
         return reply
 
     def send(self, command: codes.LiteCommand, data: bytes = b"") -> None:
-        """Send a request and wait for nothing."""
+        """Send a request without waiting."""
         self._line.send(LiteFrame(command, data))
 
     def poll(self) -> None:
-        """Take what has arrived."""
+        """Process the received frames."""
         self._polled_us = self.now_us
         self._receive(0)
 
@@ -341,7 +347,7 @@ class RequestChannel:
             continue
 
     def _free(self) -> bool:
-        """Whether a request may be sent; waits for the answer to a PING that is under way."""
+        """Return whether a request may be sent, after the answer to a running PING."""
         ping_monitor = self.ping_monitor
         if not ping_monitor.awaiting and (number := ping_monitor.tick(self.now_us)) is not None:
             self._ping(number)
@@ -383,14 +389,14 @@ class RequestChannel:
         self.send(codes.LiteCommand.PING, bytes([number]))
 
     def _receive(self, timeout_us: int) -> bool:
-        """Wait for bytes and take them; False if the line is gone."""
+        """Wait for bytes and process them. Return False if the line is gone."""
         frames = self._line.receive(timeout_us)
         for frame in frames or ():
             self._take(frame)
         return frames is not None
 
     def _take(self, frame: LiteFrame) -> None:
-        """Note what a frame says."""
+        """Process a frame."""
         match frame.command:
             case codes.LiteCommand.DATA:
                 self.pushed.append((self.now_us, messages.parse_port_data(frame.data)))

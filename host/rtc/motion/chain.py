@@ -1,4 +1,4 @@
-"""The motion chain: six components, joined as the functional specification joins them."""
+"""The motion chain of six components, which are joined as in the functional specification."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tickrig.host.rtc.motion.components.position_input import PositionInput
 from tickrig.host.rtc.motion.components.ref_hard import Opener, RefHardRh3
 
 RATE_HZ: Final = 50.0
-"""1 / control_cycle."""
+"""Rate in Hz, which is 1 / control_cycle."""
 
 CONNECTIONS: Final = (
     ("RefHardRh3.OutWheelAngle", "Odometry.CurrentWheelAngle"),
@@ -28,7 +28,7 @@ CONNECTIONS: Final = (
     ("Navigation.status", "OmniTo2WD.status"),
     ("OmniTo2WD.status_out", "PositionInput.status"),
 )
-"""RH3 functional specification, wiring."""
+"""Connections of the components (RH3 functional specification, wiring)."""
 
 _WIDE: Final = {"dataport.buffer.length": "64"}
 
@@ -39,17 +39,18 @@ class MotionChain:
     Any other order also works, but delays data by periods.
 
     Args:
-        manager: runs the components.
-        open_link: opens the line to the base.
-        number: number at the end of each instance name, as in OpenRTM; each cart has its own.
+        manager: manager that runs the components.
+        open_link: function that opens the line to the base.
+        number: number at the end of each instance name, as in OpenRTM. Each cart has its own
+            number.
         rate_hz: rate of the execution context.
 
     Attributes:
-        manager: as given.
-        position_input: the component at which goals are entered.
-        odometry: the component that has the pose.
-        components: all six, in the order of execution.
-        context: their execution context.
+        manager: manager that runs the components.
+        position_input: component at which goals are entered.
+        odometry: component that has the pose.
+        components: all six components in the order of execution.
+        context: execution context of the components.
     """
 
     def __init__(
@@ -87,17 +88,17 @@ class MotionChain:
         return self._in(LifeCycleState.ERROR)
 
     def use(self, set_id: str) -> None:
-        """Let the configuration set of a name hold in all components that have it."""
+        """Activate the configuration set with a name in all components that have it."""
         for component in self.components:
             if set_id in component.configuration.sets:
                 component.configuration.activate(set_id)
 
     def activate(self) -> None:
-        """Ask all for Active."""
+        """Request Active of all components."""
         self.manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
-        """Ask those that are Active for Inactive; one that is on its way to Error refuses."""
+        """Request Inactive of the Active components. A component on its way to Error refuses."""
         for component in self.components:
             self.context.deactivate_component(component)
 

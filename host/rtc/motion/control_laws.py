@@ -1,6 +1,6 @@
-"""How the follower steers and turns, and what speeds a base can follow (rh3-control).
+"""Control laws for steering and turning, and speeds that a base can follow (rh3-control).
 
-The regulator of the Spur family follows lines and circles; the limiter is robot_speed_smooth.
+The regulator of the Spur family follows lines and circles. The limiter is robot_speed_smooth.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import Final
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, wrap
 
 _MOST_ANGULAR_ACCELERATION: Final = 5.0
-"""rad/s2: cap of what max_acc_w and acc_cycle give (rh3-control, units)."""
+"""Limit in rad/s2 for the result of max_acc_w and acc_cycle (rh3-control, units)."""
 
 _FLOOR: Final = pi / 90
-"""rad/s: the reference spin is never slower than 2 degrees a second."""
+"""Minimum of the reference spin in rad/s, which is 2 degrees per second."""
 
 _ETA: Final = 0.1
 """Share of the angular acceleration that the reference spin uses."""
@@ -27,10 +27,10 @@ class VelocityLimits:
     """The limits of a command.
 
     Attributes:
-        v: m/s.
-        w: rad/s.
-        dv: m/s from one command to the next.
-        dw: rad/s from one command to the next.
+        v: maximum forward velocity in m/s.
+        w: maximum angular velocity in rad/s.
+        dv: maximum change of the forward velocity in m/s from one command to the next.
+        dw: maximum change of the angular velocity in rad/s from one command to the next.
     """
 
     v: float
@@ -39,7 +39,7 @@ class VelocityLimits:
     dw: float
 
     def smooth(self, wanted: Twist, before: Twist) -> Twist:
-        """Return the command nearest to what is wanted."""
+        """Return the command that is nearest to the wanted velocity."""
         v, w = clip(wanted.v, self.v), clip(wanted.w, self.w)
         return Twist(before.v + clip(v - before.v, self.dv), before.w + clip(w - before.w, self.dw))
 
@@ -47,13 +47,13 @@ class VelocityLimits:
 def steps(
     max_acc_v: float, max_acc_w: float, tick_s: float, acc_cycle_s: float
 ) -> tuple[float, float]:
-    """Return the steps that `max_acc_*` allow in a tick; they are given for each `acc_cycle_s`."""
+    """Return the steps that `max_acc_*` allow in a tick. They are given for each `acc_cycle_s`."""
     share = tick_s / acc_cycle_s
     return max_acc_v * share, min(max_acc_w * share, _MOST_ANGULAR_ACCELERATION * tick_s)
 
 
 class ControlLaw(StrEnum):
-    """How the angular velocity goes on from one command to the next."""
+    """Integration of the angular velocity from one command to the next."""
 
     IMPLICIT = "implicit"  # stable for any step; the designed dynamics
     EXPLICIT = "explicit"  # as it was: a limit cycle where step times K3 is above 2
@@ -61,16 +61,16 @@ class ControlLaw(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Regulator:
-    """Steers to a line: w' = -K3 (w - w_ff) - K2 q - K1 d.
+    """A regulator that steers to a line: w' = -K3 (w - w_ff) - K2 q - K1 d.
 
     Attributes:
-        k1: rad/s2 per metre of distance d from the line.
-        k2: rad/s2 per radian of deviation q from its heading.
-        k3: 1/s.
-        most_offset: the largest distance from the line that counts, m.
-        c1: m/s by which the speed is reduced per rad/s; not used by the explicit law.
+        k1: gain in rad/s2 per metre of distance d from the line.
+        k2: gain in rad/s2 per radian of deviation q from the heading of the line.
+        k3: gain in 1/s for the angular velocity.
+        most_offset: largest distance from the line that counts, in m.
+        c1: speed in m/s by which the cart is slower per rad/s. The explicit law does not use it.
         step_s: time from one command to the next in the law.
-        law: implicit or explicit.
+        law: integration method, implicit or explicit.
     """
 
     k1: float
@@ -88,7 +88,7 @@ class Regulator:
     def follow_circle(
         self, centre: Pose, radius: float, pose: Pose, v: float, before: Twist
     ) -> Twist:
-        """Return the command round a circle, to the left for a positive radius."""
+        """Return the command round a circle, which is to the left for a positive radius."""
         rho = hypot(pose.x - centre.x, pose.y - centre.y)
         phi = atan2(pose.y - centre.y, pose.x - centre.x)
         turn = copysign(1.0, radius)
@@ -112,13 +112,13 @@ class ReferenceSpin:
     """The spin of the reference hardware's follower.
 
     Attributes:
-        alpha: angular acceleration, rad/s2.
+        alpha: angular acceleration in rad/s2.
     """
 
     alpha: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command towards a heading, at most so fast."""
+        """Return the command towards a heading with a maximum speed."""
         q = wrap(heading - present)
         wanted = max(sqrt(2 * _ETA * self.alpha * abs(q)), _FLOOR)
         return Twist(0.0, copysign(min(most, wanted), q))
@@ -126,12 +126,12 @@ class ReferenceSpin:
 
 @dataclass(frozen=True, slots=True)
 class TimeOptimalSpin:
-    """A spin that brakes as late as it can, for the angle that it will have when it acts.
+    """A spin that brakes as late as possible, for the angle at the time of its effect.
 
     Attributes:
-        alpha: angular acceleration, rad/s2.
+        alpha: angular acceleration in rad/s2.
         step_s: time from one command to the next.
-        latency_s: from a pose to the effect of the command made of it.
+        latency_s: time from a pose to the effect of the command for that pose.
     """
 
     alpha: float
@@ -139,7 +139,7 @@ class TimeOptimalSpin:
     latency_s: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command towards a heading, at most so fast."""
+        """Return the command towards a heading with a maximum speed."""
         e = wrap(present + before.w * self.latency_s - heading)
         w = -copysign(min(most, sqrt(2 * self.alpha * abs(e))), e)
         if (e + self.latency_s * w) * e < 0:

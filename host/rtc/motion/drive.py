@@ -1,4 +1,4 @@
-"""Let a cart drive to goals, and note what it does."""
+"""Driving a cart to goals, and recording its motion."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tickrig.host.rtc.motion.ports import RunMode
 
 PERIOD_US: Final = 20_000
 SETTLE_US: Final = 500_000
-"""Time for the components to come up, and for a cart to roll on after its goal is reached."""
+"""Time for the components to start, and for a cart to stop after its goal is reached."""
 
 _ERROR_CHECK_PERIODS: Final = 5
-"""Samples from one look for a component in Error to the next."""
+"""Number of samples from one check for a component in Error to the next."""
 
 _TIMEOUT_FACTOR: Final = 3
-"""Times the least time that a way may take, and half a minute."""
+"""Factor of the least time of a path. The time-out is half a minute longer."""
 _TIMEOUT_EXTRA_S: Final = 30
 
 OnSample = Callable[[TrackSample], None]
@@ -31,7 +31,7 @@ class BaseConnection(Protocol):
 
     @property
     def chain(self) -> MotionChain:
-        """Its components."""
+        """Components of the cart."""
         ...
 
     @property
@@ -41,22 +41,22 @@ class BaseConnection(Protocol):
 
     @property
     def pose(self) -> Pose:
-        """Where it is, as well as can be known."""
+        """Best known pose of the cart."""
         ...
 
     def run_to(self, t_us: int) -> None:
-        """Go on to a time."""
+        """Continue until a time."""
 
 
 def start(connection: BaseConnection, set_id: str = "default") -> None:
-    """Let a configuration set hold, and activate all components."""
+    """Activate a configuration set, and activate all components."""
     connection.chain.use(set_id)
     connection.chain.activate()
     connection.run_to(connection.now_us + SETTLE_US)
 
 
 def stop(connection: BaseConnection) -> None:
-    """Deactivate all components; RefHardRh3 stops the base."""
+    """Deactivate all components. RefHardRh3 stops the base."""
     connection.chain.deactivate()
     connection.run_to(connection.now_us + 2 * PERIOD_US)
 
@@ -74,12 +74,12 @@ def drive(
 
     Args:
         connection: connection to the cart, with active components.
-        points: points of the path; a single point is a goal.
-        watch: called with each sample.
-        timeout_us: time limit; by default three times the shortest time and half a minute.
+        points: points of the path. A single point is a goal.
+        watch: function that is called with each sample.
+        timeout_us: time limit. By default, it is three times the shortest time and half a minute.
 
     Raises:
-        ValueError: no point, or an invalid number.
+        ValueError: there is no point, or a number is invalid.
     """
     entered, start_us = connection.chain.position_input, connection.now_us
     finished = entered.finished
@@ -104,7 +104,7 @@ def _timeout_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
 
 
 def _sample(connection: BaseConnection, time_s: float) -> TrackSample:
-    """Return what a cart does now."""
+    """Return the present sample of a cart."""
     follower = connection.chain.path_follower
     path = follower.path
     line = Pose(path.x, path.y, path.theta) if path.type == RunMode.LINEFOLLOW else None
@@ -112,7 +112,7 @@ def _sample(connection: BaseConnection, time_s: float) -> TrackSample:
 
 
 def set_latency(chain: MotionChain, response_s: float) -> None:
-    """Tune the set `tuned` to a base: its time constant in s, and one and a half periods."""
+    """Tune the set `tuned` to a base by its time constant in s, and one and a half periods."""
     latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
     for component in (chain.navigation, chain.path_follower):
         component.configuration.set("latency", latency, "tuned")

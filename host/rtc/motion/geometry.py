@@ -7,22 +7,22 @@ from typing import NamedTuple
 
 
 class Pose(NamedTuple):
-    """A place, and the way to look."""
+    """A position and a heading."""
 
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
 
     def along(self, point: Pose) -> float:
-        """Return how far a point is ahead of the line through here."""
+        """Return the distance of a point ahead, along the line through this pose."""
         return (point.x - self.x) * cos(self.heading) + (point.y - self.y) * sin(self.heading)
 
     def left(self, point: Pose) -> float:
-        """Return how far a point is to the left of the line through here."""
+        """Return the distance of a point to the left of the line through this pose."""
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 
     def distance(self, point: Pose) -> float:
-        """Return how far a point is."""
+        """Return the distance of a point."""
         return hypot(point.x - self.x, point.y - self.y)
 
     def bearing(self, point: Pose) -> float:
@@ -31,14 +31,14 @@ class Pose(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """A velocity: forward in m/s, to the left in rad/s."""
+    """A velocity, forward and to the left in m/s, and turning in rad/s."""
 
     v: float = 0.0
     w: float = 0.0
 
 
 def wrap(angle: float) -> float:
-    """Return an angle in -pi..pi, pi itself for half a turn.
+    """Return an angle in -pi..pi. Half a turn is pi.
 
     >>> wrap(3 * pi) == wrap(-pi) == pi
     True
@@ -53,12 +53,12 @@ def positive(angle: float) -> float:
 
 
 def clip(value: float, limit: float) -> float:
-    """Return a value within a limit to both sides."""
+    """Return a value limited in both directions."""
     return min(max(value, -limit), limit)
 
 
 class Wheels(NamedTuple):
-    """What an odometry takes for the geometry of its cart: radii and axle, m."""
+    """The cart geometry that an odometry uses: radii and axle in m."""
 
     left: float
     right: float
@@ -68,7 +68,7 @@ class Wheels(NamedTuple):
 def wheel_speeds(
     twist: Twist, tread: float, radius_left: float, radius_right: float
 ) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel, rad/s."""
+    """Return the speeds of the left and the right wheel in rad/s."""
     half = twist.w * tread / 2
     return (twist.v - half) / radius_left, (twist.v + half) / radius_right
 
@@ -89,5 +89,5 @@ def moved(pose: Pose, left_m: float, right_m: float, tread: float) -> Pose:
 
 
 def twist_of(left: float, right: float, tread: float) -> Twist:
-    """Return the velocity of a cart whose wheels roll at these speeds, m/s."""
+    """Return the velocity of a cart whose wheels roll at these speeds in m/s."""
     return Twist((left + right) / 2, (right - left) / tread)

@@ -1,4 +1,4 @@
-"""The common interfaces of mobile robots (IIS): their rules, and what joins their phases."""
+"""The common interfaces of mobile robots (IIS), with their rules, and adapters of their phases."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ T = TypeVar("T", bound=Struct)
 
 
 class _Adapter(RtComponent, Generic[S, T]):
-    """Converts each value at its port `in` and writes it to `out`, unless it cannot be converted.
+    """A component that converts each value at its port `in` and writes the result to `out`.
 
-    A subclass names the types of both ports in brackets, and overrides `convert`.
+    A value that cannot be converted is dropped. A subclass names the types of both ports in
+    brackets, and overrides `convert`.
     """
 
     def __init__(self, instance_name: str) -> None:
@@ -36,11 +37,11 @@ class _Adapter(RtComponent, Generic[S, T]):
         self.leaving = self.add_port(OutPort[T]("out", target))
 
     def convert(self, value: S) -> T | None:
-        """Return a value that arrived as one that leaves, None if it cannot be."""
+        """Return the converted value, or None if it cannot be converted."""
         raise NotImplementedError
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Convert what arrived."""
+        """Convert the values that arrived."""
         for value in ports.read_all(self.arriving):
             if (converted := self.convert(value)) is not None:
                 self.leaving.write(converted)
@@ -48,7 +49,7 @@ class _Adapter(RtComponent, Generic[S, T]):
 
 
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
-    """A moving command of phase 1 for a robot of phase 2."""
+    """An adapter from a moving command of phase 1 to a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
 
@@ -58,17 +59,17 @@ class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
 
 
 class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
-    """A moving command of phase 2 for a robot of phase 1; it does not go sideways."""
+    """An adapter from a moving command of phase 2 to a robot of phase 1 without sideways motion."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To1", "IIS velocity, phase 2 to 1")
 
     def convert(self, value: iis.TimedVelocity) -> rtc.TimedVelocity:
-        """Return a velocity without what goes sideways."""
+        """Return a velocity without its sideways part."""
         return rtc.TimedVelocity(value.tm, value.vx, value.w)
 
 
 class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
-    """A moving command of phase 2 for a robot of phase 3."""
+    """An adapter from a moving command of phase 2 to a robot of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To3", "IIS velocity, phase 2 to 3")
 
@@ -79,7 +80,7 @@ class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
 
 
 class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
-    """A moving command of phase 3 for a robot of phase 2."""
+    """An adapter from a moving command of phase 3 to a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity3To2", "IIS velocity, phase 3 to 2")
 
@@ -90,12 +91,12 @@ class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
 
 
 class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
-    """A self-position of phase 2 for those of phase 3."""
+    """An adapter from a self-position of phase 2 to phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
-        """Return the same pose, heading in 0..2 pi; None if a number is none."""
+        """Return the pose with its heading in 0..2 pi, or None if a number is invalid."""
         if not ports.plausible(value.x, value.y, value.theta):
             return None
         pose = Pose(value.x, value.y, positive(value.theta))
@@ -103,12 +104,12 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
 
 class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
-    """A self-position of phase 3, or of RH3, for those of phase 2."""
+    """An adapter from a self-position of phase 3, or of RH3, to phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
-        """Return the same pose, heading in 0..2 pi; None if a number is none."""
+        """Return the pose with its heading in 0..2 pi, or None if a number is invalid."""
         if (pose := ports.to_pose(value.data)) is None:
             return None
         numbers = (pose.x, pose.y, positive(pose.heading))
@@ -116,12 +117,12 @@ class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
 
 
 class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """A pose of RH3 for an IIS interface: heading in 0..2 pi."""
+    """An adapter from a pose of RH3 to an IIS interface, with the heading in 0..2 pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositiveHeading", "Heading in 0..2 pi")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPose2D | None:
-        """Return the pose with its heading in 0..2 pi; None if a number is none."""
+        """Return the pose with its heading in 0..2 pi, or None if a number is invalid."""
         if (pose := ports.to_pose(value.data)) is None:
             return None
         data = ports.to_pose_2d(pose._replace(heading=positive(pose.heading)))
@@ -129,17 +130,17 @@ class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
 
 class WrappedHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """A pose of an IIS interface for RH3: heading in -pi..pi."""
+    """An adapter from a pose of an IIS interface to RH3, with the heading in -pi..pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("WrappedHeading", "Heading in -pi..pi")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPose2D | None:
-        """Return the pose with its heading in -pi..pi; None if a number is none."""
+        """Return the pose with its heading in -pi..pi, or None if a number is invalid."""
         return _with_wrapped_heading(value)
 
 
 def _with_wrapped_heading(value: iis.TimedPose2D) -> iis.TimedPose2D | None:
-    """Return a pose with its heading in -pi..pi; None if a number is none."""
+    """Return a pose with its heading in -pi..pi, or None if a number is invalid."""
     pose = ports.to_pose(value.data)
     return pose and iis.TimedPose2D(value.tm, value.id, ports.to_pose_2d(pose), value.error)
 
@@ -147,16 +148,16 @@ def _with_wrapped_heading(value: iis.TimedPose2D) -> iis.TimedPose2D | None:
 # The goal interface of IIS in front of the planner of RH3, and its running information.
 
 _PERIOD_US: Final = 10_000
-"""What IIS recommends at most."""
+"""Longest period that IIS recommends."""
 
 _LOG: Final = log_of(__name__)
 
 
 class RunningInformation(RtComponent):
-    """Calculates velocities in the robot's frame from its poses, and writes one each period.
+    """A component that calculates velocities in the robot's frame from poses, one in each period.
 
     If the latest pose is older than `timeout`, the velocity is 0. Use an execution context of 100
-    Hz or more; a slower one is logged. `tm` is the time of the later pose.
+    Hz or more. A slower context is logged. `tm` is the time of the later pose.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")
@@ -184,7 +185,7 @@ class RunningInformation(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take new poses, write the velocity."""
+        """Take new poses, and write the velocity."""
         for sample in ports.read_all(self.position):
             if (pose := ports.to_pose(sample.data)) is not None:
                 self._take(sample.tm, pose)
@@ -208,11 +209,11 @@ class RunningInformation(RtComponent):
 
 
 class GoalInterface(RtComponent):
-    """Accepts goals as IIS defines them: the first pose counts, an empty list clears the goal.
+    """A component for goals of IIS. The first pose counts, and an empty list clears the goal.
 
-    A new goal replaces the old one. A cleared goal becomes an empty path, so the
-    cart stops on the spot, as IIS recommends. A goal with an invalid number is ignored. Join
-    `position` with OmniTo2WD.goal and `min_path` with Navigation.min_path.
+    A new goal replaces the old goal. A cleared goal becomes an empty path, so the cart stops on the
+    spot, as IIS recommends. A goal with an invalid number is ignored. Join `position` with
+    OmniTo2WD.goal and `min_path` with Navigation.min_path.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GoalInterface", "IIS goals for RH3")
@@ -224,7 +225,7 @@ class GoalInterface(RtComponent):
         self.min_path = self.add_port(OutPort("min_path", iis.TimedPath2DSeq))
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Pass the newest goal on."""
+        """Pass on the newest goal."""
         if (goal := ports.read_newest(self.goal)) is None:
             return ReturnCode.RTC_OK
         now = Time.from_us(ec.now_us)
@@ -239,14 +240,14 @@ class GoalInterface(RtComponent):
 
 PASSED: Final = 0
 STOPPED: Final = 1
-"""`id[0]` of a running state; IIS leaves open how the flag is carried."""
+"""Value of `id[0]` in a running state. IIS does not define how the flag is carried."""
 
 _LEAST_WAY_M: Final = 1e-3
-"""Metres between way points that are no way."""
+"""Distance in m between way points below which there is no line."""
 
 
 class _PathStage(Enum):
-    """What the cart does on its path."""
+    """Stage of the cart on its path."""
 
     IDLE = auto()
     TURN = auto()  # on the spot, to where the next line goes
@@ -255,14 +256,14 @@ class _PathStage(Enum):
 
 
 class _WayPoint(NamedTuple):
-    """A way point, and the speed on the line that leads there, negative backward."""
+    """A way point, and the speed on the line to it, which is negative for backward motion."""
 
     pose: Pose
     speed: float
 
 
 class PathInterface(RtComponent):
-    """Follows paths as IIS defines them, and reports passed way points.
+    """A component that follows paths of IIS, and reports passed way points.
 
     | rule | here |
     |---|---|
@@ -274,8 +275,8 @@ class PathInterface(RtComponent):
     | running state | each way point when it is passed, the last once more with `STOPPED` |
 
     Lines are straight, with turns on the spot between them. The component ignores vy, va, and the
-    headings of all way points but the last; IIS allows this. A list with an invalid number is
-    ignored. The component replaces OmniTo2WD and Navigation: join `target_path` with
+    headings of all way points but the last. IIS allows this. A list with an invalid number is
+    ignored. The component replaces OmniTo2WD and Navigation, so join `target_path` with
     PathFollower.target_path. The configuration set of PathFollower should be `tuned`.
     """
 
@@ -352,7 +353,7 @@ class PathInterface(RtComponent):
                 pass
 
     def _next(self, now: Time, pose: Pose) -> None:
-        """Turn to the next way point that is away; to the last heading when there is none."""
+        """Turn to the next way point at a distance, or to the last heading when there is none."""
         self._at += 1
         while self._at < len(self._points):
             target, speed = self._points[self._at]
@@ -369,7 +370,7 @@ class PathInterface(RtComponent):
         self._command(now, ports.RunMode.SPIN, line, w=1.0)
 
     def _drive(self, now: Time, pose: Pose) -> None:
-        """Drive on, no faster than the cart can brake before the way point."""
+        """Drive with at most the speed from which the cart can brake before the way point."""
         wanted = self._points[self._at].speed
         most = min(abs(wanted) or self.max_vel.value, self.max_vel.value)
         way = copysign(1.0, wanted) if wanted else 1.0
@@ -391,7 +392,7 @@ class PathInterface(RtComponent):
     def _command(
         self, now: Time, mode: ports.RunMode, line: Pose, v: float = 0.0, w: float = 0.0
     ) -> None:
-        """Command the follower; it takes one message a period, so the last one counts."""
+        """Command the follower. It takes one message per period, so the last message counts."""
         self._order = Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now)
 
     def _report(self, now: Time, point: Pose, flag: int) -> None:

@@ -1,4 +1,4 @@
-"""A Modbus RTU master that waits for nothing: begin a request, look for its answer later."""
+"""A Modbus RTU master that does not wait. Begin a request, and poll for its answer later."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 
 TIMEOUT_US: Final = 20_000
-"""How long an answer may take (rh3-control, drive protocol)."""
+"""Longest time until an answer (rh3-control, drive protocol)."""
 
 _CODES: Final = {code.value: code for code in modbus.ExceptionCode}
 
@@ -21,9 +21,9 @@ class ModbusAnswer:
     """The answer of a slave.
 
     Attributes:
-        request: the answered request.
-        values: the registers that were read.
-        refusal: why the slave refused the request, if it did.
+        request: request that was answered.
+        values: registers that were read.
+        refusal: reason why the slave refused the request, or None.
     """
 
     request: modbus.Request
@@ -32,23 +32,23 @@ class ModbusAnswer:
 
 
 class ModbusMaster:
-    """Sends requests to one slave; one request is under way at a time.
+    """A master that sends requests to one slave. One request is under way at a time.
 
-    On a line with echo the master skips its own frames. A late answer is taken for the answer to
+    On a line with echo, the master skips its own frames. A late answer is taken for the answer to
     the next request, if it has the same form.
 
-    pymodbus and minimalmodbus wait on the machine's clock and cannot wait on the clock of a rig. So
-    this master is an own implementation, over the codec of the slave; the tests of the slave use
-    those libraries.
+    pymodbus and minimalmodbus wait on the machine's clock and cannot wait on the clock of a rig.
+    Therefore this master is an own implementation, with the codec of the slave. The tests of the
+    slave use those libraries.
 
     Args:
-        link: the line.
+        link: line to the slave.
         address: address of the slave, 1..247.
-        timeout_us: how long an answer may take.
-        retries: how often a request without an answer is repeated.
+        timeout_us: longest time until an answer.
+        retries: number of repetitions of a request without an answer.
 
     Attributes:
-        pending: the request under way.
+        pending: request that is under way.
         misses: number of requests in a row without an answer.
         lost: total number of requests without an answer, for statistics.
     """
@@ -64,7 +64,7 @@ class ModbusMaster:
         self._tries = self._until_us = 0
 
     def begin(self, request: modbus.Request) -> None:
-        """Send a request; a request that is under way is dropped.
+        """Send a request. A request that is under way is dropped.
 
         Raises:
             LinkClosed: the line is closed.
@@ -73,7 +73,7 @@ class ModbusMaster:
         self._send(request)
 
     def poll(self) -> ModbusAnswer | None:
-        """Return the answer if it has arrived; repeat the request if the answer is overdue.
+        """Return the answer if it has arrived. Repeat the request if the answer is overdue.
 
         Raises:
             LinkClosed: the line is closed.

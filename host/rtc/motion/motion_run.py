@@ -1,4 +1,4 @@
-"""What a cart did on its way, and how well (rh3-control, customary measures)."""
+"""The record of a cart's motion, and its quality (rh3-control, customary measures)."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tickrig.host.rtc.motion.control_laws import VelocityLimits
 from tickrig.host.rtc.motion.geometry import Pose, Twist, wrap
 
 _LONG_M: Final = 1.0
-"""A leg from here on is judged by its cross-track error."""
+"""Length in m from which a leg is judged by its cross-track error."""
 
 _ROUNDING: Final = 1e-9
 
 
 class TrackSample(NamedTuple):
-    """A cart in one period.
+    """The state of a cart in one period.
 
     Attributes:
-        time_s: since the start of the run.
+        time_s: time since the start of the run.
         pose: pose of the cart.
-        twist: the commanded velocity.
-        line: end of the line that the cart follows; None while it turns or stands.
+        twist: commanded velocity.
+        line: end of the line that the cart follows, or None while it turns or stands.
     """
 
     time_s: float
@@ -35,7 +35,7 @@ class TrackSample(NamedTuple):
 
 
 class _CrossTrack(NamedTuple):
-    """Distance from the line: root of the mean square, and most, m."""
+    """Distance from the line in m, as root mean square and as maximum."""
 
     rms: float
     most: float
@@ -46,9 +46,10 @@ class MotionRun:
     """A way from a pose to a goal.
 
     Attributes:
-        goal: the wanted end of the way.
-        samples: a sample for each period.
-        reached_s: when the components reported that the goal was reached; None without a report.
+        goal: wanted end of the path.
+        samples: samples of the run, one for each period.
+        reached_s: time at which the components reported that the goal was reached, or None without
+            a report.
     """
 
     goal: Pose
@@ -57,22 +58,22 @@ class MotionRun:
 
     @property
     def duration_s(self) -> float:
-        """How long it was watched."""
+        """Duration of the record."""
         return self.samples[-1].time_s
 
     @property
     def end(self) -> Pose:
-        """Where the cart stands."""
+        """Last pose of the cart."""
         return self.samples[-1].pose
 
     @property
     def error_m(self) -> float:
-        """How far from the goal it stands."""
+        """Distance of the last pose from the goal."""
         return self.end.distance(self.goal)
 
     @property
     def heading_error_rad(self) -> float:
-        """How far it is turned from the heading of the goal, without sign."""
+        """Deviation of the last heading from the heading of the goal, without sign."""
         return abs(wrap(self.end.heading - self.goal.heading))
 
     @property
@@ -82,7 +83,7 @@ class MotionRun:
 
     @property
     def cross_track(self) -> _CrossTrack:
-        """How far it was beside its long legs."""
+        """Distance of the cart from its long legs."""
         errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
             0.0
         ]
@@ -90,7 +91,7 @@ class MotionRun:
         return _CrossTrack(sqrt(square), max(map(abs, errors)))
 
     def violations(self, limits: VelocityLimits) -> int:
-        """Return how many commands were beyond a limit."""
+        """Return the number of commands that exceeded a limit."""
         return sum(_violates(a.twist, b.twist, limits) for a, b in pairwise(self.samples))
 
     def _long_legs(self) -> Sequence[tuple[Pose, list[TrackSample]]]:
@@ -113,7 +114,7 @@ def _violates(before: Twist, now: Twist, limits: VelocityLimits) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """What a cart can do at most: m/s, rad/s, m/s2, rad/s2; as the default set has it."""
+    """The limits of a cart in m/s, rad/s, m/s2 and rad/s2, as in the default set."""
 
     v: float = 0.3
     w: float = 0.3
@@ -122,7 +123,7 @@ class MotionLimits:
 
 
 def way_time_s(way: float, speed: float, acceleration: float) -> float:
-    """Return how long a way takes from rest to rest.
+    """Return the time of a straight motion from rest to rest.
 
     >>> way_time_s(3.0, 0.3, 0.3), way_time_s(0.3, 1.0, 0.3)
     (11.0, 2.0)
@@ -150,17 +151,17 @@ def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> 
 
 WIDTH: Final = 60
 _HEIGHT: Final = 16
-"""Cells."""
+"""Height of a map in cells."""
 _MARGIN: Final = 0.08
-"""Share of the larger side that is left free all round."""
+"""Share of the larger side that is left free around the map."""
 _SMALLEST_M: Final = 0.5
 _DRAW_EVERY: Final = 10
-"""Samples from one drawing to the next."""
+"""Number of samples from one drawing to the next."""
 _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 class TrackMap:
-    """Draws goals and a track on the largest scale that fits; x to the right, y up.
+    """A map of goals and a track on the largest scale that fits. x is to the right, y is up.
 
     Args:
         points: points that the map must contain.
@@ -189,11 +190,11 @@ class TrackMap:
                 self._set(x + right, y + down)
 
     def add(self, pose: Pose) -> None:
-        """Mark where the cart is; nothing outside the map."""
+        """Mark the position of the cart. Positions outside of the map are not marked."""
         self._set(*self._dot(pose))
 
     def rows(self) -> list[str]:
-        """Return the map, a text for each row of cells."""
+        """Return the map, with a text for each row of cells."""
         canvas = self._canvas
         return ["".join(text for text, _ in canvas.row(row)) for row in range(canvas.height)]
 
@@ -206,11 +207,11 @@ class TrackMap:
 
 
 class LiveMap:
-    """Receives each sample; draws the map and a line of numbers below it.
+    """A map that takes each sample. Below the map is a line of numbers.
 
     Args:
-        track: the map that is drawn.
-        paint: writes text that may contain cursor movements of a terminal.
+        track: map that is drawn.
+        paint: function that writes text. The text may contain cursor movements of a terminal.
     """
 
     def __init__(self, track: TrackMap, paint: Callable[[str], None]) -> None:
@@ -218,7 +219,7 @@ class LiveMap:
         self._count = self._height = 0
 
     def watch(self, sample: TrackSample) -> None:
-        """Take a sample; draw if it is time."""
+        """Take a sample. Draw the map if that is due."""
         self._track.add(sample.pose)
         if self._count % _DRAW_EVERY == 0:
             self._draw(sample)

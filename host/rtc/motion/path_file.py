@@ -1,4 +1,4 @@
-"""Goals and paths as text: of a file in metres and radians, of a console in metres and degrees."""
+"""Goals and paths as text, in a file with metres and radians, or typed with metres and degrees."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.ports import plausible
 
 FARTHEST_M: Final = 1_000
-"""A goal farther than this from the start is a slip of the pen: it takes an hour."""
+"""Distance in m above which a goal is a mistake, because it takes an hour."""
 
 
 def within_reach(goal: Pose) -> bool:
@@ -20,7 +20,7 @@ def within_reach(goal: Pose) -> bool:
 
 
 def read_path(path: Path) -> list[Pose]:
-    """Return the points; `#` begins a comment, commas count as spaces.
+    """Return the points of a file. `#` begins a comment, and commas count as spaces.
 
     Raises:
         ValueError: the file cannot be read, a line is not a point (the message has the line), or
@@ -40,27 +40,27 @@ def read_path(path: Path) -> list[Pose]:
 
 
 def parse_points(text: str) -> list[Pose]:
-    """Return the points that a person typed, with commas between them.
+    """Return the points of a typed text, in which commas separate the points.
 
     >>> parse_points("2 0, 2 2 90")[0]
     Pose(x=2.0, y=0.0, heading=0.0)
 
     Raises:
-        ValueError: a part is not a point; the message has this part.
+        ValueError: a part is not a point. The message has this part.
     """
     points = [part.split() for part in text.split(",")]
     return [in_degrees(_numbers(words), " ".join(words)) for words in points]
 
 
 def in_degrees(numbers: Sequence[float], text: str) -> Pose:
-    """Return the pose of two or three numbers: metres, metres, degrees.
+    """Return the pose of two or three numbers in metres, metres and degrees.
 
     Args:
-        numbers: the numbers as text.
-        text: the text that represents them in a message.
+        numbers: numbers as text.
+        text: text that represents the numbers in a message.
 
     Raises:
-        ValueError: there are not two or three numbers, one is invalid, or the pose is beyond
+        ValueError: there are not two or three numbers, a number is invalid, or the pose is beyond
             `FARTHEST_M`.
     """
     if len(numbers) not in (2, 3) or not plausible(*numbers):
@@ -72,7 +72,7 @@ def in_degrees(numbers: Sequence[float], text: str) -> Pose:
 
 
 def describe_pose(pose: Pose) -> str:
-    """Return a pose for people, in metres and degrees."""
+    """Return a pose as text, in metres and degrees."""
     return f"{pose.x:.3f} {pose.y:.3f} m, {degrees(pose.heading):.1f} deg"
 
 
@@ -86,7 +86,7 @@ def _point(place: str, text: str, words: list[str]) -> Pose:
 
 
 def _numbers(words: Sequence[str]) -> list[float]:
-    """Return words as numbers, none if one of them is not a number."""
+    """Return words as numbers, or none if one of them is not a number."""
     try:
         return [float(word) for word in words]
     except ValueError:

@@ -1,4 +1,4 @@
-"""What the motion components read and write at their ports."""
+"""The values that the motion components read and write at their ports."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, Time, Velocity2D
 T = TypeVar("T", bound=Struct)
 
 MOST: Final = 1e9
-"""Numbers beyond it are no metres, radians or speeds of a cart."""
+"""Limit above which a number is not in metres, radians or a speed of a cart."""
 
 
 class NavigationState(IntEnum):
-    """What `TimedState.data` says of a navigation."""
+    """Values of `TimedState.data` for a navigation."""
 
     FINISH = 0
     ANGLE_CHECK = 1
@@ -31,7 +31,7 @@ class NavigationState(IntEnum):
 
 
 class RunMode(IntEnum):
-    """What `Path.type` asks for."""
+    """Values of `Path.type`."""
 
     FREE = 0
     STOP = 1
@@ -44,13 +44,13 @@ class RunMode(IntEnum):
 
 
 def read_all(port: InPort[T]) -> Iterator[T]:
-    """Yield what arrived since the last read, oldest first."""
+    """Yield the values since the last read. The oldest value is first."""
     while port.is_new and (value := port.read()) is not None:
         yield value
 
 
 def read_newest(port: InPort[T]) -> T | None:
-    """Return what arrived last, None if nothing did; the rest is dropped."""
+    """Return the latest value, or None if there is none. Other values are dropped."""
     latest = None
     while port.is_new:
         latest = port.read()
@@ -58,7 +58,7 @@ def read_newest(port: InPort[T]) -> T | None:
 
 
 def plausible(*numbers: float) -> bool:
-    """Return whether these can be numbers of a cart: not NaN, infinite or beyond `MOST`."""
+    """Return whether numbers are plausible for a cart: not NaN, infinite or beyond `MOST`."""
     for number in numbers:  # noqa: SIM110 - all() takes twice as long
         if not -MOST <= number <= MOST:
             return False
@@ -66,13 +66,13 @@ def plausible(*numbers: float) -> bool:
 
 
 def to_pose(data: Pose2D) -> Pose | None:
-    """Return a pose, its heading in -pi..pi; None if a number is not `plausible`."""
+    """Return a pose with its heading in -pi..pi, or None if a number is not `plausible`."""
     x, y, heading = data.position.x, data.position.y, data.heading
     return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
 
 
 def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
-    """Return the pose that arrived last; None without one, or if a number is not `plausible`."""
+    """Return the latest pose, or None without a pose, or if a number is not `plausible`."""
     latest = read_newest(port)
     return None if latest is None else to_pose(latest.data)
 
@@ -80,10 +80,10 @@ def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
 def write_velocity(
     port: OutPort[iis.TimedVelocity2D], ec: ExecutionContext, vx: float, vy: float, va: float
 ) -> None:
-    """Write a velocity of now: m/s ahead, m/s to the left, rad/s to the left."""
+    """Write a velocity with the present time: m/s ahead, m/s to the left, rad/s to the left."""
     port.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=Velocity2D(vx, vy, va)))
 
 
 def to_pose_2d(pose: Pose) -> Pose2D:
-    """Return a pose as ports carry it."""
+    """Return a pose in the type that ports carry."""
     return Pose2D(Point2D(pose.x, pose.y), pose.heading)

@@ -1,4 +1,4 @@
-"""UMBmark: systematic errors of an odometry, measured by squares both ways, and corrected.
+"""UMBmark: errors of an odometry, measured by squares in both directions, and corrected.
 
 Source: Borenstein and Feng, Measurement and Correction of Systematic Odometry Errors in
 Mobile Robots, IEEE Transactions on Robotics and Automation 12 (6), 1996.
@@ -17,7 +17,7 @@ from tickrig.host.rtc.motion.geometry import Pose, Wheels
 SIDE_M: Final = 4.0
 
 Error = tuple[float, float]
-"""How far a cart truly is from where it thinks it is: x, y, m."""
+"""Difference between the true position of a cart and its estimate: x, y in m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class Umbmark:
     """The errors at the end of squares.
 
     Attributes:
-        clockwise: an error for each run.
-        counter_clockwise: an error for each run.
-        returns_m: how far from its start the cart stood at the end of each run.
+        clockwise: error of each run in clockwise direction.
+        counter_clockwise: error of each run in counter-clockwise direction.
+        returns_m: distance of the cart from its start at the end of each run.
     """
 
     clockwise: tuple[Error, ...]
@@ -36,11 +36,11 @@ class Umbmark:
 
     @property
     def most_m(self) -> float:
-        """E_max,syst: the larger distance of the two centres of gravity."""
+        """E_max,syst, which is the larger distance of the two centres of gravity."""
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 
     def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
-        """Return the geometry that compensates the errors; the mean radius stays."""
+        """Return the geometry that compensates the errors. The mean radius is unchanged."""
         (x_cw, _), (x_ccw, _) = _centre(self.clockwise), _centre(self.counter_clockwise)
         alpha = (x_cw + x_ccw) / (-4 * side_m)
         beta = (x_cw - x_ccw) / (-4 * side_m)
@@ -55,7 +55,7 @@ class Umbmark:
 
 
 def _centre(errors: Sequence[Error]) -> Error:
-    """Return the centre of gravity.
+    """Return the centre of gravity of errors.
 
     >>> _centre([(0.0, 1.0), (2.0, 3.0)])
     (1.0, 2.0)
@@ -76,14 +76,15 @@ def run_umbmark(
     side_m: float = SIDE_M,
     watch: OnSample = lambda sample: None,
 ) -> Umbmark:
-    """Drive squares both ways, each from the origin.
+    """Drive squares in both directions, each from the origin.
 
     Args:
-        begin: starts run number n, from 0 on, with a cart at the origin and active components.
-        true_pose: measures where the cart is at the end of a run.
+        begin: function that starts run number n, from 0 on, with a cart at the origin and active
+            components.
+        true_pose: function that measures the position of the cart at the end of a run.
         runs: number of runs in each direction.
-        side_m: side length of the squares; UMBmark has 4 m.
-        watch: called with each sample.
+        side_m: side length of the squares. UMBmark has 4 m.
+        watch: function that is called with each sample.
 
     Raises:
         TimeoutError: a square did not end in time.

@@ -22,17 +22,18 @@ def connect(
     name: str = "",
     connector_id: str = "",
 ) -> ConnectorBase:
-    """Join an OutPort and an InPort, or two service ports; their order does not matter.
+    """Connect an OutPort and an InPort, or two service ports. Their order does not matter.
 
     Args:
-        first: a port.
-        second: the other one.
-        properties: `dataport.*` of data ports; see `ConnectorOptions.parse`.
-        name: name of the connector; its ID if left out.
-        connector_id: unique in a system; made of the names of the ports if left out.
+        first: first port.
+        second: second port.
+        properties: properties `dataport.*` of data ports; see `ConnectorOptions.parse`.
+        name: name of the connector. By default, it is the ID.
+        connector_id: ID that is unique in a system. By default, it is made from the names of the
+            ports.
 
     Raises:
-        RtcRefused: the ports do not fit or are joined already, one of them has a connector with
+        RtcRefused: the ports do not fit or are connected already, one of them has a connector with
             this ID, or the properties are not possible.
     """
     if first is second:
@@ -48,14 +49,14 @@ def connect(
 
 
 def refuse_known_id(port: AnyPort, connector_id: str) -> None:
-    """Raise RtcRefused (PRECONDITION_NOT_MET) if a port has a connector of this ID."""
+    """Raise RtcRefused (PRECONDITION_NOT_MET) if a port has a connector with this ID."""
     if port.find_connector(connector_id):
         message = f"{port.full_name} has a connector {connector_id!r} already"
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
 
 
 class _ConnectorNames(NamedTuple):
-    """What a caller wants a connector to be called; empty where that does not matter."""
+    """The name and ID that a caller wants for a connector, empty for the defaults."""
 
     name: str
     connector_id: str
@@ -108,7 +109,10 @@ def _service_connector(
 def _pairs(
     calling: ServicePort, called: ServicePort
 ) -> Iterator[tuple[Consumer[Any], Provider[Any]]]:
-    """Find a provider for each consumer: one of its type, best one of its instance name, too."""
+    """Find a provider for each consumer.
+
+    It has the same type, and if possible the same instance name.
+    """
     for consumer in calling.consumers:
         wanted = consumer.profile
         fitting = [p for p in called.providers if p.profile.type_name == wanted.type_name]

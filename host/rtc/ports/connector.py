@@ -1,4 +1,4 @@
-"""A connector between data ports: it moves values, and holds those not yet read."""
+"""A connector between data ports, which moves values, and holds unread values."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ V = TypeVar("V")
 
 
 class InterfaceType(StrEnum):
-    """How a value passes the connector (`interface_type`)."""
+    """The way in which a value passes the connector (`interface_type`)."""
 
     DIRECT = "direct"  # the value itself
     CORBA_CDR = "corba_cdr"  # its bytes, encoded and decoded again
 
 
 class DataflowType(StrEnum):
-    """Who moves the values (`dataflow_type`)."""
+    """The side that moves the values (`dataflow_type`)."""
 
     PUSH = "push"
     PULL = "pull"
 
 
 class SubscriptionType(StrEnum):
-    """When values are pushed (`subscription_type`)."""
+    """The time at which values are pushed (`subscription_type`)."""
 
     FLUSH = "flush"  # while they are written
     NEW = "new"  # at the end of the tick in which they were written
@@ -44,7 +44,7 @@ class SubscriptionType(StrEnum):
 
 
 class _PushPolicy(StrEnum):
-    """Which of the waiting values are pushed (`publisher.push_policy`)."""
+    """The waiting values that are pushed (`publisher.push_policy`)."""
 
     ALL = "all"
     FIFO = "fifo"  # the oldest; the others wait
@@ -54,7 +54,7 @@ class _PushPolicy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ConnectorOptions:
-    """What the properties say."""
+    """The options in the properties of a connector."""
 
     interface: InterfaceType
     dataflow: DataflowType
@@ -77,11 +77,11 @@ class ConnectorOptions:
 
     @classmethod
     def parse(cls, properties: Mapping[str, str]) -> ConnectorOptions:
-        """Read properties; those left out have OpenRTM's defaults, and `direct`.
+        """Read properties. Missing properties have OpenRTM's defaults, and `direct`.
 
         Keys that are not in this table are kept and have no effect.
 
-        | key, behind `dataport.` | values |
+        | key, after `dataport.` | values |
         |---|---|
         | `interface_type` | direct, corba_cdr |
         | `dataflow_type` | push, pull |
@@ -117,7 +117,7 @@ class ConnectorOptions:
 
 @dataclass(frozen=True, slots=True)
 class _Reader:
-    """Reads one property at a time; what holds for one end alone goes first."""
+    """A reader of single properties. A property for one end takes precedence."""
 
     properties: Mapping[str, str]
     end: str = ""
@@ -162,7 +162,7 @@ def _rate(text: str) -> float:
 
 
 def _endian(text: str) -> Endian:
-    """Return the byte order that is preferred: the first of those named, little if none is."""
+    """Return the preferred byte order, which is the first of those named, or little endian."""
     first, *_ = [Endian(word.strip()) for word in (text or Endian.LITTLE).split(",")]
     return first
 
@@ -174,10 +174,10 @@ _SECOND_US: Final = 1_000_000
 
 
 class _Publisher(Generic[T]):
-    """Holds values until a tick takes them.
+    """A publisher that holds values until a tick takes them.
 
-    With `new` the next tick takes them, else a tick at a multiple of a period. With `new` the push
-    policy `fifo` means `all`, because OpenRTM pushes once per write.
+    With `new`, the next tick takes the values. Otherwise a tick at a multiple of a period takes
+    them. With `new`, the push policy `fifo` means `all`, because OpenRTM pushes once per write.
     """
 
     __slots__ = ("_period_us", "_planned_us", "_policy", "_skipped", "_stride", "_values")
@@ -193,17 +193,17 @@ class _Publisher(Generic[T]):
 
     @property
     def due_us(self) -> int:
-        """When `take` has something to do: in the past for a new value, `NEVER` without one."""
+        """Time at which `take` has work to do: in the past for a new value, `NEVER` without one."""
         if not len(self._values):
             return NEVER
         return 0 if self._planned_us == NEVER else self._planned_us
 
     def write(self, value: T) -> PortStatus:
-        """Hold a value, as the policies of the OutPort's buffer say."""
+        """Hold a value, according to the policies of the OutPort's buffer."""
         return self._values.write(value)
 
     def take(self, now_us: int) -> tuple[T, ...]:
-        """Take what is pushed at `now_us`."""
+        """Take the values that are pushed at `now_us`."""
         late_us = now_us % self._period_us
         taken = () if late_us and now_us < self._planned_us else self._pick()
         waits = len(self._values) > 0
@@ -230,18 +230,18 @@ class _Publisher(Generic[T]):
 
 
 class Connector(ConnectorBase, Generic[T]):
-    """Moves values from an OutPort to an InPort.
+    """A connector that moves values from an OutPort to an InPort.
 
-    With `pull`, and with `push` and `flush`, a value can be read as soon as it
-    is written. With `new` and `periodic` it waits until a tick pushes it.
+    With `pull`, and with `push` and `flush`, a value can be read as soon as it is written. With
+    `new` and `periodic`, the value waits until a tick pushes it.
 
     Args:
-        profile: its profile.
-        ports: OutPort and InPort.
-        options: the settings in the properties of the profile.
+        profile: profile of the connector.
+        ports: OutPort and InPort of the connector.
+        options: settings in the properties of the profile.
 
     Attributes:
-        buffer: the values that the InPort can read.
+        buffer: buffer with the values that the InPort can read.
     """
 
     def __init__(
@@ -256,20 +256,20 @@ class Connector(ConnectorBase, Generic[T]):
 
     @property
     def publishes(self) -> bool:
-        """Whether it pushes in `tick`, later than it is written to."""
+        """Whether values are pushed in `tick`, later than they are written."""
         return self._publisher is not None
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to push: in the past for a new value, or `NEVER`."""
+        """Time at which `tick` has values to push: in the past for a new value, or `NEVER`."""
         return self._publisher.due_us if self._publisher else NEVER
 
     def write(self, value: T) -> PortStatus:
         """Take a value from the OutPort.
 
         Returns:
-            The status of the buffer that gets the value, such as PORT_OK; INVALID_ARGS if a number
-            does not fit its IDL type (with `corba_cdr`).
+            The status of the buffer that gets the value, such as PORT_OK. With `corba_cdr`,
+            INVALID_ARGS if a number does not fit its IDL type.
         """
         if self._encodes:
             try:
@@ -279,7 +279,7 @@ class Connector(ConnectorBase, Generic[T]):
         return (self._publisher or self.buffer).write(value)
 
     def tick(self, now_us: int) -> None:
-        """Push what is due."""
+        """Push the due values."""
         if self._publisher:
             for value in self._publisher.take(now_us):
                 self.buffer.write(value)

@@ -1,4 +1,4 @@
-"""Data ports: OutPorts are written to, InPorts read."""
+"""Data ports. Components write to OutPorts and read from InPorts."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class DataPort(Port[Connector[T]], Generic[T]):
     """A port for values of one type.
 
     Args:
-        name: without that of its component.
-        data_type: the struct it carries.
+        name: name of the port, without the name of its component.
+        data_type: struct that the port carries.
     """
 
     def __init__(self, name: str, data_type: type[T]) -> None:
@@ -45,17 +45,18 @@ class DataPort(Port[Connector[T]], Generic[T]):
 class OutPort(DataPort[T]):
     """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
 
-    Each connector takes each value, and moves it according to its `dataport.*` properties
+    Each connector takes each value, and moves the value according to its `dataport.*` properties
     (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
 
     Args:
-        name: without that of its component, such as `out`.
-        data_type: the struct it carries, such as `TimedLong`; InPorts of the same one fit.
+        name: name of the port without the name of its component, such as `out`.
+        data_type: struct that the port carries, such as `TimedLong`. InPorts of the same struct
+            fit.
 
     Attributes:
-        data_type: the struct it carries.
+        data_type: struct that the port carries.
     """
 
     port_type = "DataOutPort"
@@ -64,13 +65,13 @@ class OutPort(DataPort[T]):
         """Write a value to each connector, without waiting.
 
         Args:
-            value: a struct of the port's `data_type`. Its numbers are checked only by connectors
-                with `corba_cdr`.
+            value: struct of the port's `data_type`. Its numbers are checked only by connectors with
+                `corba_cdr`.
 
         Returns:
-            PORT_OK if all connectors took the value, or if there are no connectors; else the
-            status of the first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS. PORT_ERROR
-            if the write exceeds a limit of the node.
+            PORT_OK if all connectors took the value, or if there are no connectors. Otherwise the
+            status of the first connector that did not: BUFFER_FULL, BUFFER_TIMEOUT or INVALID_ARGS.
+            PORT_ERROR if the write exceeds a limit of the node.
 
         Raises:
             TypeError: the value has another type.
@@ -94,11 +95,12 @@ class InPort(DataPort[T]):
     first.
 
     Args:
-        name: without that of its component, such as `in`.
-        data_type: the struct it carries, such as `TimedLong`; OutPorts of the same one fit.
+        name: name of the port without the name of its component, such as `in`.
+        data_type: struct that the port carries, such as `TimedLong`. OutPorts of the same struct
+            fit.
 
     Attributes:
-        data_type: the struct it carries.
+        data_type: struct that the port carries.
     """
 
     port_type = "DataInPort"
@@ -116,11 +118,11 @@ class InPort(DataPort[T]):
         return False
 
     def read(self) -> T | None:
-        """Take the next value out of the first buffer that has one, without waiting.
+        """Take the next value from the first buffer that has one, without waiting.
 
         Returns:
-            The value. If there is no new value, the value of the last read again; None if there
-            was no read yet, or the connector's `empty_policy` is not `readback`.
+            The next value. If there is no new value, the value of the last read again. None if
+            there was no read yet, or the connector's `empty_policy` is not `readback`.
         """
         for connector in self.connectors:
             if connector.buffer.readable:

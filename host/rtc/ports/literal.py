@@ -1,6 +1,6 @@
-"""Values of ports as text: JSON, which is parsed without evaluating code.
+"""Values of ports as text in JSON, which is parsed without evaluating code.
 
-A struct is an object with its fields; any other value stands for the `data` of a struct with a
+A struct is an object with its fields. Any other value stands for the `data` of a struct with a
 time, which is set to the current time:
 
 >>> from tickrig.wire.rtc_types.rtc import TimedLong
@@ -27,7 +27,7 @@ S = TypeVar("S", bound=Struct)
 
 
 def literal(value: object) -> object:
-    """Return what `json.dumps` takes for a value: octets as numbers, enumerators by name."""
+    """Return a value in a form for `json.dumps`. Octets are numbers, and enumerators are names."""
     match value:
         case Struct():
             return {name: literal(getattr(value, name)) for name in value.__match_args__}
@@ -40,12 +40,12 @@ def literal(value: object) -> object:
 
 
 def read_literal(kind: type[S], given: object, now_us: int) -> S:
-    """Return the struct that a JSON value represents; fields left out have their default.
+    """Return the struct that a JSON value represents. Missing fields have their default.
 
     Args:
-        kind: the type of the struct.
-        given: the value as `json.loads` returns it.
-        now_us: the time for a struct with a time, if the value has no time.
+        kind: type of the struct.
+        given: value as `json.loads` returns it.
+        now_us: time for a struct with a time, if the value has no time.
 
     Raises:
         RtcRefused: the value does not fit the struct.

@@ -1,4 +1,4 @@
-"""What data ports and service ports have in common."""
+"""The common parts of data ports and service ports."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class ConnectorProfile:
     """A connector as OpenRTM describes it.
 
     Attributes:
-        name: for people.
-        connector_id: unique in a system.
-        ports: full names of both ports, the providing port first; a port of a peer has the name
-            that its engine uses.
-        properties: its properties, `dataport.*` for data ports.
+        name: name of the connector, for display.
+        connector_id: ID that is unique in a system.
+        ports: full names of both ports, with the providing port first. A port of a peer has the
+            name that its engine uses.
+        properties: properties of the connector, which are `dataport.*` for data ports.
     """
 
     name: str
@@ -28,7 +28,7 @@ class ConnectorProfile:
 
 
 def automatic_id(ports: tuple[str, str]) -> str:
-    """Return the ID of a connector for which its caller gave none: runs are the same."""
+    """Return the ID of a connector whose caller gave none. Equal runs have equal IDs."""
     return "_".join(ports)
 
 
@@ -37,8 +37,8 @@ class InterfaceProfile:
     """An interface of a service port.
 
     Attributes:
-        instance_name: its name on the port.
-        type_name: name of the interface type; a consumer accepts only providers of its type.
+        instance_name: name of the interface on the port.
+        type_name: name of the interface type. A consumer accepts only providers of the same type.
         polarity: `PROVIDED` or `REQUIRED`.
     """
 
@@ -53,9 +53,9 @@ class PortProfile:
 
     Attributes:
         name: full name, such as `ConsoleIn0.out`.
-        interfaces: the interfaces of a service port.
-        connector_profiles: its connectors.
-        properties: `port.port_type`, `dataport.data_type`, ...
+        interfaces: interfaces of a service port.
+        connector_profiles: profiles of the port's connectors.
+        properties: properties such as `port.port_type` and `dataport.data_type`.
     """
 
     name: str
@@ -68,12 +68,13 @@ Listener = Callable[[ConnectorProfile], None]
 
 
 class ConnectorBase:
-    """A connector between two ports, which have it until it is ended.
+    """A connector between two ports. Both ports have the connector until it ends.
 
     Attributes:
-        profile: its profile.
-        ports: the local ports of `profile.ports`: both, or the one that is joined with a peer's.
-        joined: True between begin and end.
+        profile: profile of the connector.
+        ports: local ports of `profile.ports`, which are both, or the one that is connected with a
+            peer's port.
+        joined: whether the connector is joined, which is True between `begin` and `end`.
     """
 
     def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, ...]) -> None:
@@ -81,16 +82,19 @@ class ConnectorBase:
 
     @property
     def state(self) -> str:
-        """Whether its peer answers, `connected` or `lost`; empty if both ports are here."""
+        """State of the peer, `connected` or `lost`, empty if both ports are local."""
         return ""
 
     @property
     def joins_components(self) -> bool:
-        """Whether both its ports are here, each of a component; those of probes are of none."""
+        """Whether both ports are local ports of components.
+
+        Ports of probes belong to no component.
+        """
         return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
-        """Add the connector to both ports, then notify their listeners.
+        """Add the connector to both ports, then notify the listeners of the ports.
 
         Raises:
             RtcRefused: the guard of a port does not admit the connector.
@@ -105,7 +109,7 @@ class ConnectorBase:
             port.notify(port.on_connect, self.profile)
 
     def end(self) -> None:
-        """Take it from both ports, then notify their listeners; ending it twice is no error."""
+        """Remove the connector from both ports, then notify the listeners. You may end it twice."""
         joined, self.joined = self.joined, False
         for port in self.ports if joined else ():
             port.detach(self)
@@ -117,13 +121,13 @@ C = TypeVar("C", bound=ConnectorBase)
 
 
 class PortGuard(Protocol):
-    """Sees to it that a port stays within the limits of the node that it is on."""
+    """A guard that keeps a port within the limits of its node."""
 
     def admit(self, connector: ConnectorBase, /) -> None:
-        """Raise RtcRefused unless a port may have one more connector, this one."""
+        """Raise RtcRefused unless the port may have this additional connector."""
 
     def passes(self, port: AnyPort, value: Any, /) -> bool:
-        """Return whether a value may leave by a port, or come in by one from a peer."""
+        """Return whether a value may leave through a port, or arrive at it from a peer."""
         ...
 
 
@@ -131,16 +135,18 @@ class Port(Generic[C]):
     """A named end of connectors.
 
     Args:
-        name: without that of its component.
+        name: name of the port, without the name of its component.
 
     Attributes:
-        name: without that of its component.
-        port_type: the name of its class in OpenRTM, such as `DataInPort`.
-        owner: instance name of its component; empty without a component.
-        guard: keeps the port within the limits of its node, if the node has limits.
-        connectors: its connectors in the order in which they were made.
-        on_connect: called with its profile after a connector was made.
-        on_disconnect: called with its profile after a connector ended.
+        name: name of the port, without the name of its component.
+        port_type: name of the port's class in OpenRTM, such as `DataInPort`.
+        owner: instance name of the port's component, empty without a component.
+        guard: guard that keeps the port within the limits of its node, or None without limits.
+        connectors: connectors of the port in the order in which they were made.
+        on_connect: functions that are called with a connector's profile after the connector was
+            made.
+        on_disconnect: functions that are called with a connector's profile after the connector
+            ended.
     """
 
     port_type: ClassVar[str]
@@ -154,55 +160,55 @@ class Port(Generic[C]):
 
     @property
     def full_name(self) -> str:
-        """Its name in profiles, such as `ConsoleIn0.out`."""
+        """Name of the port in profiles, such as `ConsoleIn0.out`."""
         return f"{self.owner}.{self.name}" if self.owner else self.name
 
     @property
     def profile(self) -> PortProfile:
-        """The port as it is."""
+        """Profile of the port in its present state."""
         connectors = tuple(connector.profile for connector in self.connectors)
         properties = {"port.port_type": self.port_type, **self._properties()}
         return PortProfile(self.full_name, self._interfaces(), connectors, properties)
 
     def find_connector(self, connector_id: str) -> C | None:
-        """Look for a connector by its ID.
+        """Return the connector with an ID.
 
         Args:
-            connector_id: the ID in its profile.
+            connector_id: ID in the profile of the connector.
 
         Returns:
-            The connector; None if the port has no connector with this ID.
+            The connector, or None if the port has no connector with this ID.
         """
         found = (own for own in self.connectors if own.profile.connector_id == connector_id)
         return next(found, None)
 
     def connector_to(self, other: AnyPort) -> C | None:
-        """Look for the connector that joins this port with another one.
+        """Return the connector between this port and another port.
 
         Args:
-            other: the other port.
+            other: other port of the connector.
 
         Returns:
-            The connector, None if there is none.
+            The connector, or None if there is none.
         """
         shared = (own for own in self.connectors if own in other.connectors)
         return next(shared, None) if other is not self else None
 
     def disconnect_all(self) -> None:
-        """End all its connectors."""
+        """End all connectors of the port."""
         for connector in self.connectors:
             connector.end()
 
     def attach(self, connector: C) -> None:
-        """Have a connector."""
+        """Add a connector to the port."""
         self.connectors += (connector,)
 
     def detach(self, connector: C) -> None:
-        """Have a connector no more."""
+        """Remove a connector from the port."""
         self.connectors = tuple(c for c in self.connectors if c is not connector)
 
     def notify(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
-        """Call listeners with the profile of a connector; what one raises is logged."""
+        """Call listeners with the profile of a connector. An exception of a listener is logged."""
         call_listeners(self.full_name, listeners, profile)
 
     def _properties(self) -> Mapping[str, str]:
@@ -213,4 +219,4 @@ class Port(Generic[C]):
 
 
 AnyPort = Port[Any]
-"""A port of whatever kind."""
+"""A port of any kind."""

@@ -16,11 +16,11 @@ DEFAULT_LENGTH: Final = 8
 _MAX_LENGTH: Final = 1_000_000
 
 _OK: Final = PortStatus.PORT_OK
-"""To look a member of an enum up takes 0.1 us."""
+"""Value that is looked up once, because looking up a member of an enum takes 0.1 us."""
 
 
 class FullPolicy(StrEnum):
-    """What writing into a full buffer does (`buffer.write.full_policy`)."""
+    """Effect of a write to a full buffer (`buffer.write.full_policy`)."""
 
     OVERWRITE = "overwrite"
     DO_NOTHING = "do_nothing"
@@ -28,7 +28,7 @@ class FullPolicy(StrEnum):
 
 
 class EmptyPolicy(StrEnum):
-    """What reading from an empty buffer does (`buffer.read.empty_policy`)."""
+    """Effect of a read from an empty buffer (`buffer.read.empty_policy`)."""
 
     READBACK = "readback"
     DO_NOTHING = "do_nothing"
@@ -36,7 +36,7 @@ class EmptyPolicy(StrEnum):
 
 
 class ReadPolicy(StrEnum):
-    """Which of the waiting values is read; those before it are dropped (`buffer.read.policy`)."""
+    """The waiting value that is read. Values before it are dropped (`buffer.read.policy`)."""
 
     FIFO = "fifo"
     LAST = "last"
@@ -45,14 +45,15 @@ class ReadPolicy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BufferOptions:
-    """How a buffer behaves.
+    """The settings of a buffer.
 
     Attributes:
         length: largest number of values in the buffer, 1 to 1 000 000.
         full: effect of a write to the full buffer.
         empty: effect of a read from the empty buffer.
-        read: which value is read.
-        skip_count: with `skip`, the number of values that are dropped before each read value.
+        read: policy that selects the value to read.
+        skip_count: number of values that are dropped before each read value, with the policy
+            `skip`.
 
     Raises:
         ValueError: the length is out of range, or skip_count is not below the length.
@@ -65,7 +66,7 @@ class BufferOptions:
     skip_count: int = 0
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the settings."""
         if not 1 <= self.length <= _MAX_LENGTH:
             raise ValueError(f"buffer length {self.length} is not in 1..{_MAX_LENGTH}")
         if not 0 <= self.skip_count < self.length:
@@ -73,12 +74,12 @@ class BufferOptions:
 
 
 class RingBuffer(Generic[T]):
-    """Values in the order of their arrival, up to a length.
+    """A buffer of values in the order of their arrival, up to a maximum length.
 
-    Calls do not wait: if OpenRTM would block, the call here ends as after a time-out.
+    Calls do not wait. If OpenRTM would block, the call here ends as after a time-out.
 
     Attributes:
-        on_write: called after a value was put into the buffer.
+        on_write: function that is called after a value was put into the buffer, or None.
     """
 
     __slots__ = ("_last", "_newest", "_options", "_skip", "_values", "on_write")
@@ -92,7 +93,7 @@ class RingBuffer(Generic[T]):
         self.on_write: Callable[[], None] | None = None
 
     def __len__(self) -> int:
-        """Return how many values wait."""
+        """Return the number of waiting values."""
         return len(self._values)
 
     @property
@@ -101,7 +102,7 @@ class RingBuffer(Generic[T]):
         return len(self._values) > self._skip
 
     def write(self, value: T) -> PortStatus:
-        """Put a value after the others.
+        """Add a value at the end.
 
         Returns:
             PORT_OK, also when the oldest value was overwritten. If the buffer is full: BUFFER_FULL
@@ -120,7 +121,8 @@ class RingBuffer(Generic[T]):
         """Take a value.
 
         Returns:
-            The value. If there is no new value: with `readback` the value read last, else None.
+            The value. If there is no new value: with `readback` the value that was read last,
+            otherwise None.
         """
         values, skip = self._values, self._skip
         if len(values) <= skip:
@@ -131,11 +133,11 @@ class RingBuffer(Generic[T]):
         return self._last
 
     def pop(self) -> tuple[T, ...]:
-        """Take the oldest value, if there is one."""
+        """Take the oldest value, or return None if there is none."""
         return (self._values.popleft(),) if self._values else ()
 
     def clear(self) -> tuple[T, ...]:
-        """Take all values; what was read last stays."""
+        """Drop all waiting values. The value that was read last is kept."""
         values = tuple(self._values)
         self._values.clear()
         return values

@@ -1,4 +1,4 @@
-"""Service ports: interfaces that one component provides and another calls."""
+"""Service ports, with interfaces that one component provides and another calls."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Provider(Generic[T]):
     """An interface that a port provides.
 
     Args:
-        instance_name: its name on the port.
-        type_name: the name of its interface type; only consumers of the same type fit.
-        servant: the object that executes the calls.
+        instance_name: name of the interface on the port.
+        type_name: name of the interface type. Only consumers of the same type fit.
+        servant: object that executes the calls.
     """
 
     def __init__(self, instance_name: str, type_name: str, servant: T) -> None:
@@ -25,7 +25,7 @@ class Provider(Generic[T]):
 
 
 class Consumer(Generic[T]):
-    """An interface that a port calls: `Consumer[RefHard]("refhard", "RefHard")`.
+    """An interface that a port calls, such as `Consumer[RefHard]("refhard", "RefHard")`.
 
     Calls are plain method calls. They return before anything else runs, and an exception of the
     provider is raised in the caller.
@@ -42,14 +42,17 @@ class Consumer(Generic[T]):
 
     @property
     def service(self) -> T:
-        """The provider's servant; RtcRefused (PRECONDITION_NOT_MET) without one."""
+        """The provider's servant.
+
+        RtcRefused (PRECONDITION_NOT_MET) is raised without a provider.
+        """
         if self._provider is None:
             message = f"{self.profile.instance_name} is not connected"
             raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
         return self._provider.servant
 
     def take(self, provider: Provider[T] | None) -> None:
-        """Call this provider from now on; none ends it."""
+        """Use this provider from now on. None removes the present provider."""
         self._provider = provider
 
 
@@ -57,7 +60,7 @@ _Interface = Provider[Any] | Consumer[Any]
 
 
 class ServicePort(port.Port["ServiceConnector"]):
-    """A port with interfaces, each provided or required."""
+    """A port with interfaces, which are provided or required."""
 
     port_type = "CorbaPort"
 
@@ -72,7 +75,7 @@ class ServicePort(port.Port["ServiceConnector"]):
         return provider
 
     def require(self, consumer: Consumer[T]) -> Consumer[T]:
-        """Add an interface that is to be called, and return it."""
+        """Add an interface that this component calls, and return it."""
         self.consumers.append(consumer)
         return consumer
 
@@ -82,7 +85,7 @@ class ServicePort(port.Port["ServiceConnector"]):
 
 
 class ServiceConnector(port.ConnectorBase):
-    """Gives the consumers of each port the providers of the other."""
+    """A connector that gives the consumers of each port the providers of the other port."""
 
     def __init__(
         self,
@@ -100,7 +103,7 @@ class ServiceConnector(port.ConnectorBase):
         super().begin()
 
     def end(self) -> None:
-        """Take the providers away, then notify the listeners of both ports."""
+        """Remove the providers, then notify the listeners of both ports."""
         for consumer, _ in self._pairs if self.joined else ():
             consumer.take(None)
         super().end()

@@ -26,13 +26,13 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 
 
 class CallQueue:
-    """Takes calls from any thread; the one that runs the manager makes them between its ticks.
+    """A queue of calls from any thread. The manager's thread makes the calls between its ticks.
 
     A `ServingClock` calls `serve` while it waits. If this thread also serves a control socket,
     `LineServer.attach(queue, queue.make)` serves both.
 
     Args:
-        timeout_us: how long a call waits for that thread, unless its caller sets a time.
+        timeout_us: longest time that a call waits for that thread, unless its caller sets a time.
     """
 
     def __init__(self, timeout_us: int = CALL_TIMEOUT_US) -> None:
@@ -43,7 +43,7 @@ class CallQueue:
         self._reader.setblocking(False)
 
     def fileno(self) -> int:
-        """Return what can be read while there is something to `make`; -1 at the end."""
+        """Return a descriptor that can be read while calls wait for `make`, or -1 at the end."""
         return self._reader.fileno()
 
     def call(self, function: Callable[[], _R], timeout_us: int | None = None) -> _R:
@@ -52,8 +52,9 @@ class CallQueue:
         If the caller is in that thread, the function is called at once.
 
         Args:
-            function: the function; it must not wait.
-            timeout_us: how long to wait until it begins; the time-out of the queue if left out.
+            function: function to call, which must not wait.
+            timeout_us: longest time until the call begins. By default, it is the time-out of the
+                queue.
 
         Returns:
             The result of the function.
@@ -76,7 +77,7 @@ class CallQueue:
         raise TimeoutError(f"the system did not begin the call within {wait_s:g} s")
 
     def post(self, function: Callable[[], object]) -> None:
-        """Schedule a call of a function in the manager's thread; its exceptions are logged.
+        """Schedule a call of a function in the manager's thread. Its exceptions are logged.
 
         Raises:
             RtcRefused: the system has ended.
@@ -84,7 +85,7 @@ class CallQueue:
         self._enter((None, function))
 
     def make(self) -> None:
-        """Execute the waiting calls; calls added during this time wait for the next call."""
+        """Execute the waiting calls. Calls added during this time wait for the next `make`."""
         self._owner = threading.get_ident()
         for future, function in self._taken():
             if future is None:
@@ -93,7 +94,10 @@ class CallQueue:
                 _fulfil(future, function)
 
     def serve(self, wait_us: int) -> None:
-        """Make the calls that wait; if there are none, wait for the first, up to `wait_us`."""
+        """Execute the waiting calls.
+
+        If there are none, wait for the first call, up to `wait_us`.
+        """
         wait_s = max(0, wait_us) / 1e6
         if self._closed:
             time.sleep(wait_s)
@@ -101,7 +105,7 @@ class CallQueue:
             self.make()
 
     def close(self) -> None:
-        """Refuse the calls that wait, and all that come."""
+        """Refuse the waiting calls, and all further calls."""
         with self._lock:
             was_closed, self._closed = self._closed, True
         if was_closed:
@@ -149,13 +153,13 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 
 
 class Arrivals:
-    """Calls executed at the beginning of the next tick; an item of a schedule.
+    """Calls that are executed at the beginning of the next tick. They are an item of a schedule.
 
     No code reads a value before the next tick, so values need not wake the manager's thread.
     Waking it for each value would take three times the processor time.
 
     Attributes:
-        due_us: always `NEVER`: the calls do not make a tick earlier.
+        due_us: due time, always `NEVER`, because the calls do not make a tick earlier.
     """
 
     due_us: Final = NEVER
@@ -164,7 +168,7 @@ class Arrivals:
         self._calls: deque[Callable[[], object]] = deque()
 
     def post(self, call: Callable[[], object]) -> None:
-        """Have a call made, in any thread."""
+        """Schedule a call, in any thread."""
         self._calls.append(call)
 
     def tick(self, now_us: int, /) -> None:

@@ -1,4 +1,4 @@
-r"""Components and what joins them as a graph in the language of Graphviz.
+r"""Components and their connections as a graph in the language of Graphviz.
 
 >>> print(write_dot([Box("A0", "Adder", (), ("out",)), Box("B0", "", ("in",), ())],
 ...                 [Edge("A0.out", "B0.in")]))
@@ -28,7 +28,7 @@ class Box:
     Attributes:
         title: text below its name.
         ins: names of the ports at its left.
-        outs: names of the other ports.
+        outs: names of the other ports, at the right.
         state: state of its life cycle, such as `ACTIVE`.
     """
 
@@ -53,7 +53,7 @@ class Edge:
 
 
 def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
-    """Return the graph."""
+    """Return the graph in the language of Graphviz."""
     lines = ["digraph system {", "  rankdir=LR;", "  node [shape=record];"]
     lines += (f'  "{box.name}" [label="{_label(box)}"];' for box in boxes)
     lines += (
@@ -64,12 +64,12 @@ def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
 
 
 def system_graph(components: Iterable[Any]) -> str:
-    """Return the graph of a system whose components are described as the control socket does."""
+    """Return the graph of a system whose components have the descriptions of a control socket."""
     return write_dot(*boxes_and_edges(components))
 
 
 def boxes_and_edges(components: Iterable[Any]) -> tuple[list[Box], list[Edge]]:
-    """Return the boxes and edges of a system that is described as the control socket does."""
+    """Return the boxes and edges of a system with the descriptions of a control socket."""
     described = tuple(components)
     ends = dict.fromkeys(
         tuple(connector["ports"])

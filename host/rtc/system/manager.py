@@ -1,4 +1,4 @@
-"""The manager of a system: it makes and ends components, joins their ports, and runs them."""
+"""The manager of a system, which makes and ends components, connects their ports, and runs them."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ _MOTION: Final[dict[str, str]] = {
     "PositiveHeading": "iis_interfaces:PositiveHeading",
     "WrappedHeading": "iis_interfaces:WrappedHeading",
 }
-"""The motion chain of RH3, what is around it, and the interfaces of IIS, in `host.rtc.motion`."""
+"""Types in `host.rtc.motion`: the motion chain of RH3, options for it, and interfaces of IIS."""
 
 
 def _is_component_type(found: object) -> bool:
-    """Return whether this is a class of components, one that can be registered."""
+    """Return whether an object is a class of components that can be registered."""
     return (
         isinstance(found, type)
         and issubclass(found, RtComponent)
@@ -77,11 +77,11 @@ COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
     _is_component_type,
     "an RtComponent with a spec",
 )
-"""The entry-point group `tickrig.components` (docs/howto/extending.md)."""
+"""Entry-point group `tickrig.components` (docs/howto/extending.md)."""
 
 
 def _installed_type(name: str) -> type[RtComponent]:
-    """Load one of them; RtcRefused if that fails, or if its class has another name."""
+    """Load an installed type. Raise RtcRefused if that fails, or if its class has another name."""
     try:
         found = COMPONENT_TYPES.load(name)
     except ExtensionError as error:
@@ -99,8 +99,9 @@ class RemoteEntry:
     """A component that runs elsewhere.
 
     Attributes:
-        name: how it is called in the system, such as `Joystick0` in `Joystick0.out`.
-        path: where its engine finds it, such as `localhost:2809/robot.host_cxt/Joystick0.rtc`.
+        name: name of the component in the system, such as `Joystick0` in `Joystick0.out`.
+        path: path of the component for its engine, such as
+            `localhost:2809/robot.host_cxt/Joystick0.rtc`.
     """
 
     name: str
@@ -114,11 +115,11 @@ class RemoteConnection:
     Attributes:
         port: full name of the local port.
         remote: the component that runs elsewhere.
-        remote_port: its port, without the name of the component.
-        ports: both full names, in the order in which they were given.
-        name: for people.
+        remote_port: port of that component, without the name of the component.
+        ports: full names of both ports, in the order in which they were given.
+        name: name of the connector, for display.
         properties: properties of the connector.
-        connector_id: its ID.
+        connector_id: ID of the connector.
     """
 
     port: str
@@ -132,7 +133,7 @@ class RemoteConnection:
 
 @dataclass(slots=True)
 class Remotes:
-    """The components that run elsewhere and the connectors with them, as a system file has them."""
+    """The components that run elsewhere, and the connectors to them, as in a system file."""
 
     components: list[RemoteEntry] = field(default_factory=list)
     connections: list[RemoteConnection] = field(default_factory=list)
@@ -144,25 +145,26 @@ class Remotes:
 class NameService:
     """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
 
-    These names exist only in this process. Not emulated: a CORBA naming service for other ones.
+    These names exist only in this process. Not emulated: a CORBA naming service for other
+    processes.
     """
 
     def __init__(self) -> None:
         self._components: dict[str, RtComponent] = {}
 
     def bind(self, path: str, component: RtComponent) -> None:
-        """Give a component a path; RtcRefused if it is taken."""
+        """Bind a component to a path. Raise RtcRefused if the path is taken."""
         path = _plain(path)
         if path in self._components:
             raise RtcRefused(f"{path} is taken")
         self._components[path] = component
 
     def unbind(self, path: str) -> None:
-        """Take a path away; one that is not there is no error."""
+        """Remove a path. A path that does not exist has no effect."""
         self._components.pop(_plain(path), None)
 
     def resolve(self, path: str) -> RtComponent:
-        """Return the component at a path; RtcRefused if there is none."""
+        """Return the component at a path. Raise RtcRefused if there is none."""
         path = _plain(path)
         if path not in self._components:
             known = ", ".join(self._components) or "none"
@@ -170,7 +172,7 @@ class NameService:
         return self._components[path]
 
     def names(self, context: str = "") -> tuple[str, ...]:
-        """Return what stands in a naming context: names, and contexts with `/` at their end."""
+        """Return the names in a naming context. Names of contexts end with `/`."""
         prefix = f"{_plain(context)}/" if _plain(context) else ""
         rests = (path.removeprefix(prefix) for path in self._components if path.startswith(prefix))
         heads = (rest.partition("/") for rest in rests)
@@ -189,23 +191,24 @@ DEFAULT_RATE_HZ: Final = 1_000.0
 
 
 class Manager(Schedule):
-    """Creates components, names them, joins their ports and runs them (OpenRTM-aist 1.x, Manager).
+    """A manager that creates, names, connects and runs components (OpenRTM-aist 1.x, Manager).
 
-    It has no clock: `run_for` and `run_to` pass virtual time, in us; in real time `RealTime` waits
-    for `due_us` and calls `tick`.
+    The manager has no clock. `run_for` and `run_to` pass virtual time, in us. In real time,
+    `RealTime` waits for `due_us` and calls `tick`.
 
     Not emulated: loading of modules from files, and master managers. Component
     types are registered, or found by the name that an installed package gives them.
 
     Args:
-        host: naming context of its components.
+        host: naming context of the manager's components.
 
     Attributes:
-        names: its components, such as `localhost/ConsoleIn0.rtc`.
-        path_uris: by instance name, paths of components in other name servers, from RTSProfiles.
-        remotes: components that run elsewhere, which an engine joins with those here.
-        on_added: called with each component that is added, once it has its name.
-        on_removed: called with each component that ended, once its name is free.
+        names: names of the manager's components, such as `localhost/ConsoleIn0.rtc`.
+        path_uris: paths of components in other name servers, from RTSProfiles, by instance name.
+        remotes: components that run elsewhere. An engine connects them with the local components.
+        on_added: functions that are called with each component that is added, once the component
+            has its name.
+        on_removed: functions that are called with each component that ended, once its name is free.
     """
 
     def __init__(self, host: str = "localhost") -> None:
@@ -220,7 +223,7 @@ class Manager(Schedule):
 
     @property
     def types(self) -> tuple[str, ...]:
-        """Names of the types that can be created, registered ones before those installed."""
+        """Names of the types that can be created. Registered types come before installed types."""
         return tuple(dict.fromkeys((*self._registered, *self._installed)))
 
     @property
@@ -230,7 +233,7 @@ class Manager(Schedule):
 
     @property
     def connectors(self) -> tuple[ConnectorProfile, ...]:
-        """All connectors between its components, each once."""
+        """All connectors between the manager's components. Each connector occurs once."""
         ports = [port for component in self.components for port in component.ports.values()]
         own = set(ports)
         profiles = {
@@ -245,7 +248,7 @@ class Manager(Schedule):
         """Register a class, so that `create` can create components of it.
 
         Args:
-            kind: the class, under the type name of its `spec`.
+            kind: class of components, which is registered under the type name of its `spec`.
         """
         self._registered[kind.spec.type_name] = kind
 
@@ -259,13 +262,15 @@ class Manager(Schedule):
         """Create a component of a type that is registered or installed, and add it; see `add`.
 
         Args:
-            type_name: as registered, or as a package names it (docs/howto/extending.md).
-            instance_name: the type name with the lowest number that is free, if left out.
-            rate_hz: of its own execution context.
-            context: execution context of the component; if left out, it gets its own.
+            type_name: name of the type, as registered, or as a package names it
+                (docs/howto/extending.md).
+            instance_name: instance name. By default, it is the type name with the lowest free
+                number.
+            rate_hz: rate of the component's own execution context.
+            context: execution context of the component. By default, the component gets its own.
 
         Returns:
-            The component.
+            The created component.
 
         Raises:
             RtcRefused: the type is unknown or cannot be loaded, or `add` refuses the component.
@@ -282,15 +287,15 @@ class Manager(Schedule):
         """Initialize a component, name it, and start its execution context.
 
         Args:
-            component: a component of your own.
-            rate_hz: of its own execution context, 1 uHz to 1 MHz.
-            context: execution context of the component; if left out, it gets its own.
+            component: component to add, such as one of your own.
+            rate_hz: rate of the component's own execution context, 1 uHz to 1 MHz.
+            context: execution context of the component. By default, the component gets its own.
 
         Returns:
-            The component itself.
+            The added component.
 
         Raises:
-            RtcRefused: its name is taken, or on_initialize failed.
+            RtcRefused: the name of the component is taken, or on_initialize failed.
             ValueError: no execution context can have this rate.
         """
         name = component.instance_name
@@ -311,22 +316,24 @@ class Manager(Schedule):
         return component
 
     def delete(self, name: str) -> None:
-        """End a component; if a callback calls this method, at the end of the tick.
+        """End a component.
+
+        If a callback calls this method, the component ends at the end of the tick.
 
         Args:
-            name: its instance name or path.
+            name: instance name or path of the component.
 
         Raises:
-            RtcRefused: no such component.
+            RtcRefused: there is no such component.
         """
         component = self.find(name)
         self.defer(lambda: self._end(component))
 
     def find(self, name: str) -> RtComponent:
-        """Find a component.
+        """Return the component with a name.
 
         Args:
-            name: its instance name or path, as `ConsoleIn0` or `localhost/ConsoleIn0.rtc`.
+            name: instance name or path, such as `ConsoleIn0` or `localhost/ConsoleIn0.rtc`.
 
         Returns:
             The component.
@@ -342,16 +349,17 @@ class Manager(Schedule):
         return component
 
     def port(self, name: str) -> AnyPort:
-        """Look a port up.
+        """Return the port with a name.
 
         Args:
-            name: its full name or path, as `ConsoleIn0.out` or `localhost/ConsoleIn0.rtc:out`.
+            name: full name or path of the port, such as `ConsoleIn0.out` or
+                `localhost/ConsoleIn0.rtc:out`.
 
         Returns:
             The port.
 
         Raises:
-            RtcRefused: no such component or port.
+            RtcRefused: there is no such component or port.
         """
         owner, _, port_name = name.rpartition(":" if ":" in name else ".")
         component = self.find(owner)
@@ -369,18 +377,18 @@ class Manager(Schedule):
         name: str = "",
         connector_id: str = "",
     ) -> ConnectorProfile:
-        """Join two ports.
+        """Connect two ports.
 
         Args:
-            first: the name of one, as `port` takes it.
-            second: the name of the other.
-            properties: what is to hold for the connector, such as
-                `{"dataport.subscription_type": "new"}`; the rest is as OpenRTM has it.
-            name: of the connector, for people.
-            connector_id: its ID; made of the names of the ports if left out.
+            first: name of the first port, as `port` takes it.
+            second: name of the second port, as `port` takes it.
+            properties: properties of the connector, such as `{"dataport.subscription_type":
+                "new"}`. Other properties have OpenRTM's defaults.
+            name: name of the connector, for display.
+            connector_id: ID of the connector. By default, it is made from the names of the ports.
 
         Returns:
-            The connector as it was made.
+            The connector that was made.
 
         Raises:
             RtcRefused: there is no such port, the ports do not fit, another connector has this ID,
@@ -399,12 +407,12 @@ class Manager(Schedule):
         """End the connector between two ports.
 
         Args:
-            first: the name of one, as `port` takes it.
-            second: the name of the other; if it belongs to no component here, as the profile of the
-                connector has it.
+            first: name of the first port, as `port` takes it.
+            second: name of the second port. If it belongs to no local component, use the name in
+                the profile of the connector.
 
         Raises:
-            RtcRefused: no such port, or they are not connected.
+            RtcRefused: there is no such port, or the ports are not connected.
         """
         try:
             connector = self.port(first).connector_to(self.port(second))
@@ -417,39 +425,39 @@ class Manager(Schedule):
         connector.end()
 
     def _connector_elsewhere(self, first: str, second: str) -> ConnectorBase | None:
-        """Return the connector of a port here with one that no component here has."""
+        """Return the connector of a local port to a port that no local component has."""
         ends = {first, second}
         ports = (port for one in self.components for port in one.ports.values())
         found = (one for port in ports for one in port.connectors)
         return next((one for one in found if set(one.profile.ports) == ends), None)
 
     def context_of(self, name: str) -> ExecutionContext:
-        """Look up the first execution context of a component.
+        """Return the first execution context of a component.
 
         Args:
-            name: the component's instance name or path.
+            name: instance name or path of the component.
 
         Returns:
             The execution context.
 
         Raises:
-            RtcRefused: no such component, or it takes part in none.
+            RtcRefused: there is no such component, or it takes part in no execution context.
         """
         if not (contexts := self.find(name).contexts):
             raise RtcRefused(f"{name} takes part in no execution context")
         return contexts[0]
 
     def state_of(self, name: str) -> LifeCycleState:
-        """Look at the state of a component in its first execution context.
+        """Return the state of a component in its first execution context.
 
         Args:
-            name: the component's instance name or path.
+            name: instance name or path of the component.
 
         Returns:
             The state.
 
         Raises:
-            RtcRefused: no such component, or it takes part in no execution context.
+            RtcRefused: there is no such component, or it takes part in no execution context.
         """
         return self.context_of(name).state_of(self.find(name))
 
@@ -457,10 +465,10 @@ class Manager(Schedule):
         """Request the move to Active.
 
         Args:
-            names: names of the components; the requests are made one after the other.
+            names: names of the components. The requests are made one after the other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
+            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
         """
         self._request("activate", ExecutionContext.activate_component, names)
 
@@ -468,10 +476,10 @@ class Manager(Schedule):
         """Request the move to Inactive.
 
         Args:
-            names: names of the components; the requests are made one after the other.
+            names: names of the components. The requests are made one after the other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
+            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
         """
         self._request("deactivate", ExecutionContext.deactivate_component, names)
 
@@ -479,21 +487,21 @@ class Manager(Schedule):
         """Request the move from Error to Inactive.
 
         Args:
-            names: names of the components; the requests are made one after the other.
+            names: names of the components. The requests are made one after the other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
+            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
         """
         self._request("reset", ExecutionContext.reset_component, names)
 
     def free_name(self, type_name: str) -> str:
-        """Find an instance name that is free.
+        """Return a free instance name.
 
         Args:
-            type_name: the beginning of the name.
+            type_name: beginning of the name.
 
         Returns:
-            The type name with the lowest number that is free, such as `ConsoleIn0`.
+            The type name with the lowest free number, such as `ConsoleIn0`.
         """
         return next(
             name for number in count() if (name := f"{type_name}{number}") not in self._components
@@ -503,7 +511,7 @@ class Manager(Schedule):
         """Return the path of a component in the name service.
 
         Args:
-            name: its instance name.
+            name: instance name of the component.
 
         Returns:
             The path, such as `localhost/ConsoleIn0.rtc`.
@@ -512,7 +520,7 @@ class Manager(Schedule):
 
     @cached_property
     def _installed(self) -> tuple[str, ...]:
-        """Names of the types that installed packages have, ours first."""
+        """Names of the installed types. The types of this package come first."""
         return tuple(COMPONENT_TYPES.names())
 
     def _type(self, name: str) -> type[RtComponent]:
@@ -547,7 +555,7 @@ class Manager(Schedule):
             call_listeners(name, self.on_removed, component)
 
     def _leave(self, component: RtComponent) -> None:
-        """Take a component that could not be initialized out of its context."""
+        """Remove a component that could not be initialized from its context."""
         for own in component.own_contexts:
             self.remove_context(own)
         for context in tuple(component.contexts):

@@ -1,4 +1,4 @@
-"""Threads that call peers for many connectors: one thread, until a peer hangs."""
+"""Threads that call peers for many connectors, with one thread until a peer hangs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tickrig.host.text.log import log_of
 # A thread for the calls into one peer: a peer that hangs delays no other.
 
 _PeerCall = Callable[[], float | None]
-"""Returns after how many seconds it wants to be made again, None if it does not."""
+"""Function that returns the seconds after which it must be called again, or None."""
 
 _RETRY_US: Final = 1_000_000
 
@@ -25,10 +25,10 @@ _LOG: Final = log_of(__name__)
 
 
 class _CallingThread(threading.Thread):
-    """The thread of a `PeerThread`; it does not keep the process alive.
+    """The thread of a `PeerThread`. It does not keep the process alive.
 
     Attributes:
-        ending: whether it ends after its current call.
+        ending: whether the thread ends after its current call.
     """
 
     ending = False
@@ -37,24 +37,24 @@ class _CallingThread(threading.Thread):
 def calls_run() -> bool:
     """Return whether a thread that should end is still in a call.
 
-    A process that ends during a call may abort or hang: the call is in C++ code.
+    A process that ends during a call may abort or hang, because the call is in C++ code.
     """
     threads = threading.enumerate()
     return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
 
 
 class PeerThread:
-    """Makes calls into a peer, one after the other, in a thread of its own.
+    """A thread that makes calls to a peer, one after the other.
 
     A call that hangs delays the calls after it, up to the time-out of the engine (1 s for a CORBA
     call). The thread does not keep the process alive.
 
     Args:
-        name: name of the peer, for people.
+        name: name of the peer, for display.
         retry_us: time after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: the same, in seconds.
+        retry_s: time `retry_us` in seconds.
     """
 
     def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
@@ -65,11 +65,11 @@ class PeerThread:
         self._thread.start()
 
     def submit(self, call: _PeerCall) -> None:
-        """Have a call made after those that wait; nothing waits for it here."""
+        """Schedule a call after the waiting calls. The caller does not wait."""
         self._calls.put(call)
 
     def close(self, wait_us: int = 0) -> None:
-        """End after the present call; wait for that, but not longer than `wait_us`."""
+        """End the thread after the present call. Wait for that, at most `wait_us`."""
         self._thread.ending = True
         self._calls.put(None)
         self._thread.join(wait_us / 1e6)
@@ -90,7 +90,7 @@ class PeerThread:
             heappush(self._repeated, (time.monotonic() + again_s, next(self._order), call))
 
     def _next(self) -> _PeerCall | None:
-        """Wait for the next call; those that are repeated come at their time."""
+        """Wait for the next call. Repeated calls come at their time."""
         wait_s = None
         if self._repeated:
             wait_s = self._repeated[0][0] - time.monotonic()
@@ -103,14 +103,15 @@ class PeerThread:
 
 
 _PATIENCE_S: Final = 0.005
-"""The longest wait for the call of another connector; then a further thread starts."""
+"""The longest wait for the call of another connector. After this, a further thread starts."""
 
 _LANES: Final = 2
-"""Number of threads for calls that are answered: two hide the wake-up time of each answer, and more
-than two wait for each other."""
+"""Number of threads for calls that are answered. Two threads hide the wake-up time of each answer,
+and more than two wait for each other.
+"""
 
 _IDLE_S: Final = 5.0
-"""So long a thread waits for something to do; who hangs is called again each second."""
+"""Idle time after which a thread ends. A peer that hangs is called again each second."""
 
 _MOST: Final = 256
 
@@ -118,29 +119,29 @@ _CONNECTORS_LOG: Final = log_of(__name__)
 
 
 class PeerCaller(Protocol):
-    """Makes calls into peers, in threads of its own: `PeerThread`, `PeerThreads`."""
+    """An object that makes calls to peers in its own threads, `PeerThread` or `PeerThreads`."""
 
     retry_s: float
 
     def submit(self, call: _PeerCall) -> None:
-        """Have a call made; nothing waits for it here."""
+        """Schedule a call. The caller does not wait."""
         ...
 
 
 class PeerThreads:
-    """Makes the calls of many connectors, each of which makes one call at a time.
+    """Threads that make the calls of many connectors. Each connector makes one call at a time.
 
-    As long as peers answer at once there is one thread. It takes a third of the processor time that
-    a thread for each connector would take. If calls wait, a second thread is started, and one more
-    for each call that hangs.
+    As long as peers answer at once, there is one thread. It takes a third of the processor time
+    that a thread for each connector would take. If calls wait, a second thread is started, and one
+    more for each call that hangs.
 
     Args:
-        name: for people.
+        name: name of the threads, for display.
         retry_us: time after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: the same, in seconds.
-        running: how many threads there are.
+        retry_s: time `retry_us` in seconds.
+        running: number of running threads.
     """
 
     def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
@@ -152,7 +153,7 @@ class PeerThreads:
         self._made: dict[int, float] = {}  # since when a thread is in its call
 
     def submit(self, call: _PeerCall) -> None:
-        """Have a call made; nothing waits for it here."""
+        """Schedule a call. The caller does not wait."""
         with self._changed:
             self._append(call, wake=not self._calls)
 
@@ -163,7 +164,7 @@ class PeerThreads:
             self._changed.notify_all()
 
     def _append(self, call: _PeerCall, *, wake: bool) -> None:
-        """Enter a call; where calls wait too long, have one thread more make them."""
+        """Add a call. If calls wait too long, start one more thread."""
         now_s = time.monotonic()
         self._calls.append((now_s, call))
         if late := self._is_late(now_s):
@@ -176,7 +177,7 @@ class PeerThreads:
             threading.Thread(target=self._run, name=self._name, daemon=True).start()
 
     def _is_late(self, now_s: float) -> bool:
-        """Return whether a call waits too long, and would not with one thread more."""
+        """Return whether a call waits too long, and one more thread would help."""
         if not self.running:
             return True
         if now_s - max(self._calls[0][0], self._helped_s) <= _PATIENCE_S:
@@ -204,7 +205,7 @@ class PeerThreads:
                 heappush(self._repeated, (due_s, next(self._order), call))
 
     def _next(self) -> _PeerCall | None:
-        """Wait for the next call; None ends the thread."""
+        """Wait for the next call. None ends the thread."""
         me = threading.get_ident()
         with self._changed:
             self._made.pop(me, None)
@@ -224,7 +225,7 @@ class PeerThreads:
         return None
 
     def _take(self, now_s: float) -> _PeerCall:
-        """Take what is due to be made again, else the oldest."""
+        """Take a call that is due for repetition, or else the oldest call."""
         if self._repeated and self._repeated[0][0] <= now_s:
             return heappop(self._repeated)[2]
         return self._calls.popleft()[1]

@@ -1,4 +1,4 @@
-"""RTSProfile XML, version 0.2, as rtshell (rtcryo, rtresurrect) and RT System Editor have it.
+"""RTSProfile XML, version 0.2, as in rtshell (rtcryo, rtresurrect) and RT System Editor.
 
 Positions on a drawing, and the start-up and shut-down orders, are not written. The reader ignores
 all data that `System` does not have. A restored system is Inactive.
@@ -46,7 +46,7 @@ def write_rts_profile(
     version: str = "1.0",
     date: str = "1970-01-01T00:00:00",
 ) -> str:
-    """Write the system of a manager.
+    """Return the system of a manager as an RTSProfile.
 
     Args:
         manager: manager of the system.
@@ -69,7 +69,7 @@ def write_rts_profile(
 
 
 def parse_rts_profile(text: str) -> System:
-    """Read a system.
+    """Read a system from an RTSProfile.
 
     Raises:
         RtcRefused: the text is not XML, not an RTSProfile, or an incomplete RTSProfile.
@@ -171,7 +171,7 @@ def _component(node: ET.Element) -> ComponentEntry:
 
 
 def _sets(node: ET.Element) -> Iterator[tuple[str, Mapping[str, str]]]:
-    """Yield the configuration sets, but not those in which editors keep their own."""
+    """Yield the configuration sets, except the sets that editors use."""
     for configuration_set in node.iter(_rts("ConfigurationSets")):
         set_id = _need(configuration_set, "id")
         if not set_id.startswith("__"):

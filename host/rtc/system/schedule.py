@@ -1,4 +1,4 @@
-"""Execution contexts and pushing connectors of one system, run by time."""
+"""Execution contexts and pushing connectors of one system, which time drives."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from tickrig.host.rtc.ports.connector import Connector
 
 
 class ScheduledItem(Protocol):
-    """Something that a schedule ticks beside execution contexts and connectors."""
+    """An object that a schedule ticks in addition to execution contexts and connectors."""
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do; `NEVER` if that is not known."""
+        """Time at which `tick` has work to do, or `NEVER` if that is unknown."""
         ...
 
     def tick(self, now_us: int, /) -> None:
-        """Go on to `now_us`."""
+        """Advance to `now_us`."""
 
 
 class Schedule:
-    """Executes due items. It has no clock: `tick` takes the time.
+    """A schedule that executes due items. It has no clock, so `tick` takes the time.
 
-    A tick has four steps: other items run, then the execution contexts in the order in which they
-    were added, then connectors push, then deferred calls run. In virtual time `run_to` ticks; in
-    real time `RealTime` waits for `due_us` and ticks.
+    A tick has four steps: other items run, then the execution contexts run in the order in which
+    they were added, then connectors push, then deferred calls run. In virtual time, `run_to` ticks.
+    In real time, `RealTime` waits for `due_us` and ticks.
 
     Attributes:
-        now_us: the time of the latest tick, in us.
+        now_us: time of the latest tick in us.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Schedule:
 
     @property
     def due_us(self) -> int:
-        """The next time at which there is something to do; the present if it is overdue."""
+        """The next time at which there is work to do, or the present time if it is overdue."""
         due_us = self._contexts.due_us
         for connector in self._publishing:
             due_us = min(due_us, connector.due_us)
@@ -54,9 +54,10 @@ class Schedule:
         """Advance the time, and run all items that are due.
 
         Args:
-            now_us: the current time; never less than before.
+            now_us: current time, which is never less than before.
 
-        A caller that skips a `due_us` skips its periods: each execution context runs one at most.
+        A caller that skips a `due_us` skips its periods, because each execution context runs one
+        period at most.
         """
         self.now_us, self._ticking = now_us, True
         for item in self._items:
@@ -72,7 +73,7 @@ class Schedule:
         """Run all items that are due until a time, including that time, without waiting.
 
         Args:
-            t_us: the time.
+            t_us: time until which items run.
         """
         while (due_us := self.due_us) <= t_us:
             self.tick(due_us)
@@ -84,7 +85,7 @@ class Schedule:
         """Run all items that are due in the following time, without waiting.
 
         Args:
-            duration_us: length of this time.
+            duration_us: length of the time in us.
         """
         self.run_to(self.now_us + duration_us)
 
@@ -92,7 +93,7 @@ class Schedule:
         """Call an action at once, or at the end of the tick if a tick is running.
 
         Args:
-            action: the action.
+            action: function to call.
         """
         if self._ticking:
             self._deferred.append(action)
@@ -100,27 +101,27 @@ class Schedule:
             action()
 
     def add_context(self, context: ExecutionContext) -> None:
-        """Run an execution context from now on; one that is run already is no error."""
+        """Run an execution context from now on. Adding a context twice has no effect."""
         self._contexts.add(context, self.now_us)
 
     def remove_context(self, context: ExecutionContext) -> None:
-        """Run an execution context no more."""
+        """Stop running an execution context."""
         self._contexts.remove(context)
 
     def add_item(self, item: ScheduledItem) -> None:
         """Add an item that is ticked from now on.
 
         Args:
-            item: an object with a due time and a `tick`.
+            item: object with a due time and a `tick`.
         """
         self._items += (item,)
 
     def remove_item(self, item: ScheduledItem) -> None:
-        """Tick an item no more; one that is not ticked is no error."""
+        """Stop ticking an item. An item that is not ticked has no effect."""
         self._items = tuple(other for other in self._items if other is not item)
 
     def add_connector(self, connector: Connector[Any]) -> None:
-        """Let a connector push from now on, if it pushes later than it is written to."""
+        """Make a connector push from now on, if it pushes later than values are written."""
         self._publishing = [other for other in self._publishing if other.joined]
         if connector.publishes:
             self._publishing.append(connector)
@@ -129,35 +130,38 @@ class Schedule:
 # A schedule in real time: wait until an item is due, then tick.
 
 LATE_US: Final = 1_000
-"""A tick that begins later than this counts as late."""
+"""Delay above which a tick counts as late."""
 
 PAUSE_US: Final = 20_000
 """The longest wait, so that items that become due earlier, or a stop, are noticed."""
 
 
 class Clock(Protocol):
-    """Time since it was first waited for, in microseconds."""
+    """A clock that counts microseconds since its first wait."""
 
     def wait_until(self, t_us: int, /) -> int:
-        """Return when it is `t_us`; the answer is how late in microseconds, 0 if on time."""
+        """Wait until the time is `t_us`.
+
+        Return the delay in microseconds, which is 0 if on time.
+        """
         ...
 
 
 class RealTime:
-    """Runs a schedule by a clock; late periods are caught up, none is skipped.
+    """A runner of a schedule by a clock. Late periods are caught up, and no period is skipped.
 
     Late periods run one after the other, each with the time at which it was due. If a system always
     takes longer than its periods, its delay grows, as `worst_late_us` shows.
 
     Args:
-        schedule: the schedule, from its current time on.
-        clock: waits, and may serve clients while it waits.
+        schedule: schedule to run, from its current time on.
+        clock: clock that waits, and may serve clients while it waits.
 
     Attributes:
-        running: False once `stop` was called.
+        running: whether the schedule runs, which is False once `stop` was called.
         late_ticks: number of ticks that began more than `LATE_US` late.
-        worst_late_us: the largest delay of a tick.
-        after_tick: called with the time in us after each tick.
+        worst_late_us: largest delay of a tick in us.
+        after_tick: function that is called with the time in us after each tick.
     """
 
     def __init__(self, schedule: Schedule, clock: Clock) -> None:
@@ -167,12 +171,12 @@ class RealTime:
         self.after_tick: list[Callable[[int], None]] = []
 
     def run(self) -> None:
-        """Run until `stop` is called: by a callback, a listener, or a client of the clock."""
+        """Run until `stop` is called, by a callback, a listener, or a client of the clock."""
         while self.running:
             self.step()
 
     def step(self) -> None:
-        """Wait for the next tick, 20 ms at most, and run what is due."""
+        """Wait for the next tick, at most 20 ms, and run the due items."""
         schedule = self._schedule
         until_us = min(schedule.due_us, schedule.now_us + PAUSE_US)
         late_us = self._clock.wait_until(until_us - self._start_us)

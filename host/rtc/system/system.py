@@ -1,4 +1,4 @@
-"""A system as it is saved: its components, their configuration, and what joins them."""
+"""A system as it is saved, with its components, their configuration, and their connections."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ class ComponentEntry:
     """A component of a system.
 
     Attributes:
-        name: its instance name.
+        name: instance name of the component.
         type_name: type name of the component that is created.
-        rate_hz: rate of its execution context.
-        context: a word that components in one execution context share; empty for its own context.
-        active: whether it is activated.
-        configuration_set: the active configuration set.
-        configuration: values of each set.
-        path: path of the component in an RTSProfile; empty if there is none.
+        rate_hz: rate of the component's execution context.
+        context: word that components in one execution context share, empty for a context of its
+            own.
+        active: whether the component is activated.
+        configuration_set: name of the active configuration set.
+        configuration: values of each configuration set.
+        path: path of the component in an RTSProfile, empty if there is none.
     """
 
     name: str
@@ -50,10 +51,10 @@ class ConnectionEntry:
     """A connector of a system, by the full names of its ports.
 
     Attributes:
-        ports: both ports, the providing port first.
-        name: for people.
-        properties: its properties.
-        connector_id: its ID; empty if the ID is made of the names of the ports.
+        ports: full names of both ports, with the providing port first.
+        name: name of the connector, for display.
+        properties: properties of the connector.
+        connector_id: ID of the connector, empty if it is made from the names of the ports.
     """
 
     ports: tuple[str, str]
@@ -64,13 +65,13 @@ class ConnectionEntry:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """All components and connectors, in the order in which they are made.
+    """All components and connectors of a system, in the order in which they are made.
 
     Not saved: values in ports and buffers, and the internal state of components.
 
     Attributes:
         components: the components that are made.
-        connections: their connectors, with each other and with remote components.
+        connections: connectors of the components, with each other and with remote components.
         remotes: components that run elsewhere.
     """
 
@@ -80,7 +81,7 @@ class System:
 
 
 def describe(manager: Manager) -> System:
-    """Return the system of a manager as it is."""
+    """Return the system of a manager in its present state."""
     shared: dict[int, str] = {}
     return System(
         tuple(_entry(component, shared) for component in manager.components),
@@ -95,10 +96,10 @@ def describe(manager: Manager) -> System:
 def restore(manager: Manager, system: System) -> None:
     """Make the components and connectors of a system, and activate components marked as active.
 
-    Connectors with remote components are put into `manager.remotes`: an engine makes them.
+    Connectors to remote components are put into `manager.remotes`, and an engine makes them.
 
     Raises:
-        RtcRefused: a part cannot be made; then all parts are removed again.
+        RtcRefused: a part cannot be made. All parts are then removed again.
     """
     made: list[str] = []
     before = Remotes(list(manager.remotes.components), list(manager.remotes.connections))
@@ -117,7 +118,7 @@ def with_remotes(system: System, types: Container[str]) -> System:
     The RTSProfile of a system that several processes run has such components.
 
     Args:
-        system: the system as it was read.
+        system: system that was read.
         types: names of the types that can be created.
     """
     there = [one for one in system.components if one.path and one.type_name not in types]
@@ -146,7 +147,7 @@ def _connection(profile: ConnectorProfile) -> ConnectionEntry:
 
 
 def given_id(connector_id: str, ports: tuple[str, str]) -> str:
-    """Return the ID of a connector, empty if it is the one that it has without a caller's."""
+    """Return the ID of a connector, empty if it is the default ID."""
     return "" if connector_id == automatic_id(ports) else connector_id
 
 
@@ -170,7 +171,7 @@ def _make(manager: Manager, system: System, made: list[str]) -> None:
 
 
 def _take_remotes(manager: Manager, system: System, remotes: Mapping[str, RemoteEntry]) -> None:
-    """Note the components that run elsewhere, and what is to join them with ours."""
+    """Record the components that run elsewhere, and their connectors to the local components."""
     here = {component.instance_name for component in manager.components}
     for name in sorted(here.intersection(remotes)):
         raise RtcRefused(f"{name} is here and runs elsewhere, too")
@@ -232,7 +233,7 @@ def _configure(component: RtComponent, entry: ComponentEntry) -> None:
 
 
 def differences(wanted: System, found: System) -> Iterator[str]:
-    """Yield what is not as wanted, a line each; what is there beside it does not matter."""
+    """Yield a line for each difference. Additional parts of the system do not matter."""
     there = {entry.name: entry for entry in found.components}
     for entry in wanted.components:
         if entry.name not in there:

@@ -1,4 +1,4 @@
-"""System files on disk: TOML, or RTSProfile where the name ends in .xml.
+"""System files on disk in TOML, or in RTSProfile if the name ends in .xml.
 
 In TOML:
 
@@ -117,7 +117,7 @@ def _component(section: Section) -> dict[str, Any]:
 
 
 def write_toml(system: System) -> str:
-    """Write a system file."""
+    """Return a system as a TOML file."""
     return "\n".join(
         (*_component_lines(system), *_connection_lines(system), *_remote_lines(system))
     )
@@ -164,7 +164,7 @@ def _texts(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    """Quote a text: TOML's rules are JSON's, but for DEL."""
+    """Quote a text. TOML has the rules of JSON, except for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -173,7 +173,7 @@ _XML: Final = ".xml"
 
 
 def read_system(path: Path) -> System:
-    """Read a system file; Refused if that cannot be done."""
+    """Read a system file. Raise Refused if that fails."""
     try:
         return _parse(path, path.read_text("utf-8"))
     except UnicodeDecodeError as error:
@@ -188,8 +188,8 @@ def lacking(path: Path, text: str) -> tuple[str, ...]:
     """Return a line for each part of a file that a system lacks.
 
     Args:
-        path: the file, TOML or XML.
-        text: the system in the same format.
+        path: path of the file in TOML or XML.
+        text: text of the system in the same format.
 
     Raises:
         Refused: the file cannot be read.
@@ -202,7 +202,7 @@ def _parse(path: Path, text: str) -> System:
 
 
 def write_system(text: str, path: Path) -> None:
-    """Write a system file; Refused if that cannot be done."""
+    """Write a system file. Raise Refused if that fails."""
     try:
         write_whole(path, text)
     except OSError as error:
@@ -210,14 +210,14 @@ def write_system(text: str, path: Path) -> None:
 
 
 def file_format(path: Path) -> str:
-    """Return `toml` or `xml`; Refused for another ending."""
+    """Return `toml` or `xml`. Raise Refused for another suffix."""
     if path.suffix.lower() not in (_TOML, _XML):
         raise Refused(f"system {path}: the name ends in {_TOML} or {_XML}")
     return path.suffix.lower().removeprefix(".")
 
 
 def check_system(path: Path) -> None:
-    """See before a run whether a system could be written after it; Refused if not."""
+    """Check before a run whether a system can be written after it. Raise Refused if not."""
     file_format(path)
     try:
         check_file(path, "system")

@@ -1,4 +1,4 @@
-"""A cache before a source that may be slow, or gone."""
+"""A cache in front of a source that may be slow or unavailable."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class SourceStatus(Enum):
-    """How a request ended."""
+    """Outcome of a request."""
 
     FOUND = "found"
     UNKNOWN = "unknown"  # there is nothing under this address
@@ -21,12 +21,12 @@ class SourceStatus(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """The end of a request.
+    """The result of a request.
 
     Attributes:
-        address: the requested address.
-        status: how the request ended.
-        text: the text at this address; the reason if the request failed.
+        address: address that was requested.
+        status: outcome of the request.
+        text: text at the address, or the reason if the request failed.
     """
 
     address: str
@@ -35,24 +35,25 @@ class Fetched:
 
 
 class Source(Protocol):
-    """Gets texts by their addresses, without waiting; each request ends, if only by a time-out.
+    """A source of texts by address that does not block. Each request ends, at least by a time-out.
 
-    In real time it is an HTTP client in its own thread; in virtual time a table with a delay.
+    In real time, the source is an HTTP client in its own thread. In virtual time, it is a table
+    with a delay.
     """
 
     def request(self, address: str, now_us: int) -> None:
-        """Ask for what is under an address."""
+        """Request the text at an address."""
 
     def take(self, now_us: int) -> tuple[Fetched, ...]:
-        """Take the requests that have ended."""
+        """Return the requests that have ended."""
         ...
 
     def close(self) -> None:
-        """End; pending requests get no answer."""
+        """Close the source. Pending requests get no answer."""
 
 
 OpenSource = Callable[[str, tuple[str, ...]], Source]
-"""Makes a source for who asks, with the hosts that addresses may name."""
+"""Function that makes a source for a client, with the hosts that addresses may name."""
 
 
 _V = TypeVar("_V")
@@ -63,9 +64,10 @@ class CacheLimits:
     """Size of a cache, and life times of its entries.
 
     Attributes:
-        entries: largest number of entries; the least recently used one is removed first.
-        fresh_us: an older entry is requested again; until the answer it remains in use.
-        keep_us: an older entry is not used.
+        entries: maximum number of entries. The least recently used entry is removed first.
+        fresh_us: age after which an entry is requested again. Until the answer, the entry remains
+            in use.
+        keep_us: age after which an entry is not used.
         unknown_us: time before an unknown ucode is requested again.
         retry_us: time before a failed request is repeated.
     """
@@ -79,14 +81,14 @@ class CacheLimits:
 
 @dataclass(slots=True)
 class _CacheCounts:
-    """The numbers of look-ups in a cache by their results.
+    """The numbers of look-ups in a cache by result.
 
     Attributes:
-        hits: look-ups answered at once.
-        stale: hits that were answered by an entry that is no longer fresh.
-        misses: look-ups not answered at once.
-        unknown: misses because the address is unknown.
-        failures: requests to the source that failed.
+        hits: number of look-ups answered at once.
+        stale: number of hits that were answered by an entry that is no longer fresh.
+        misses: number of look-ups not answered at once.
+        unknown: number of misses because the address is unknown.
+        failures: number of requests to the source that failed.
         age_us: age of the entry that answered last.
     """
 
@@ -99,13 +101,16 @@ class _CacheCounts:
 
     @property
     def total(self) -> int:
-        """How many questions there were, and how many requests that failed: a sign of news."""
+        """Sum of look-ups and failed requests, which shows whether the numbers have changed."""
         return self.hits + self.misses + self.failures
 
 
 @dataclass(slots=True)
 class _Entry(Generic[_V]):
-    """What is known of an address; `next_us` is when it may be asked for again."""
+    """An entry of the cache.
+
+    `next_us` is the time from which its address may be requested again.
+    """
 
     value: _V | None = None
     fetched_us: int = 0
@@ -115,15 +120,16 @@ class _Entry(Generic[_V]):
 
 
 class LookupCache(Generic[_V]):
-    """Holds values by their addresses; while the source does not answer, old values are used.
+    """A cache of values by address. While the source does not answer, old values are used.
 
     Args:
-        parse: makes a value of a text; after a ValueError the address counts as unknown.
+        parse: function that makes a value from a text. After a ValueError, the address counts as
+            unknown.
 
     Attributes:
-        counts: the numbers of look-ups by their results.
-        trouble: why the latest request failed; empty if it succeeded.
-        invalid: the latest text that was not a value, and why.
+        counts: numbers of look-ups by result.
+        trouble: reason why the latest request failed, empty if it succeeded.
+        invalid: latest text that was not a value, with the reason.
     """
 
     def __init__(self, parse: Callable[[str], _V]) -> None:
@@ -131,11 +137,11 @@ class LookupCache(Generic[_V]):
         self.counts, self.trouble, self.invalid, self._pending = _CacheCounts(), "", "", 0
 
     def __len__(self) -> int:
-        """Return how many addresses have a value."""
+        """Return the number of addresses with a value."""
         return sum(entry.value is not None for entry in self._entries.values())
 
     def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> _V | None:
-        """Return the value under an address, None if there is none now; it may be asked for."""
+        """Return the value at an address, or None. The address may be requested."""
         entry = self._entries.setdefault(address, _Entry())
         self._entries.move_to_end(address)
         if not entry.pending and now_us >= entry.next_us and self._pending < limits.entries:
@@ -147,17 +153,17 @@ class LookupCache(Generic[_V]):
         return self._answer(entry, limits, now_us)
 
     def update(self, source: Source, limits: CacheLimits, now_us: int) -> tuple[str, ...]:
-        """Take what came from the source; return the addresses that have a value now."""
+        """Process results of the source. Return the addresses that have a value now."""
         ended = source.take(now_us)
         self._pending -= len(ended)
         return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))
 
     def value(self, address: str) -> _V | None:
-        """Return what is held under an address, however old; this is no look-up."""
+        """Return the value at an address, however old it is. This does not count as a look-up."""
         return entry.value if (entry := self._entries.get(address)) is not None else None
 
     def forget_requests(self) -> None:
-        """Expect nothing more: the source was closed."""
+        """Drop all pending requests, because the source was closed."""
         self._pending = 0
         for entry in self._entries.values():
             entry.pending = False

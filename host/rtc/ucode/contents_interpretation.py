@@ -1,4 +1,4 @@
-"""ContentsInterpretation: information under an address becomes a place and its properties."""
+"""ContentsInterpretation, which reads the place and properties in the information at an address."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tickrig.wire.rtc_types.rtc import Point2D, TimedPoint2D, TimedStringSeq
 _FAR_M: Final = 1e6
 _MOST_PROPERTIES: Final = 32
 _MOST_CHARACTERS: Final = 200
-"""Of a property."""
+"""Maximum number of characters of a property."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class Contents:
     """The information about a place.
 
     Attributes:
-        x_m: x coordinate.
-        y_m: y coordinate, to the left of x.
-        properties: each as `name=value`, in the order of the names.
+        x_m: x coordinate of the place.
+        y_m: y coordinate of the place, to the left of x.
+        properties: texts `name=value` of the properties, in the order of the names.
     """
 
     x_m: float
@@ -36,20 +36,21 @@ class Contents:
 
 
 class ContentsInterpretation(Lookup[Contents]):
-    """Reads the information about places: position and properties.
+    """A component that reads the information about places, which is position and properties.
 
-    Ports:
+    The ports are:
 
-    - `addresses` in, as `UcodeSettlement` writes them;
-    - `position` out: a point for each ucode, in m;
-    - `place` out: the ucode, then `name=value` of each property.
+    - `addresses` in, as `UcodeSettlement` writes them
+    - `position` out: a point for each ucode, in m
+    - `place` out: the ucode, then `name=value` of each property
 
-    The information is a JSON object with the numbers `x_m` and `y_m`; its other members are
-    properties. The report (Fig. 123) names the component and its cache; the rest is an addition.
+    The information is a JSON object with the numbers `x_m` and `y_m`. Its other members are
+    properties. The report (Fig. 123) names the component and its cache. The rest is an addition.
 
     Args:
         instance_name: name of the component.
-        open_source: creates the source of the information; HTTP by default.
+        open_source: function that creates the source of the information. By default, it is an HTTP
+            source.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec(

@@ -16,19 +16,19 @@ from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 
 _TIMEOUT_S: Final = 1.0
 MOST_OCTETS: Final = 8_192
-"""Of an answer, with its head."""
+"""Maximum number of octets of an answer with its head."""
 
 
 class HttpSource:
-    """Sends GET requests one after the other, in a thread: a service that hangs does not block.
+    """A client that sends GET requests one after the other in a thread, so that it does not block.
 
     An answer may take one second and have 8192 octets at most. Only the named hosts get requests,
     redirections are not followed, and HTTPS is not supported.
 
     Args:
         name: name of the client, for messages.
-        hosts: the allowed hosts.
-        timeout_s: for a whole answer.
+        hosts: hosts that may get requests.
+        timeout_s: time limit for a whole answer.
     """
 
     def __init__(self, name: str, hosts: tuple[str, ...], timeout_s: float = _TIMEOUT_S) -> None:
@@ -37,18 +37,18 @@ class HttpSource:
         self._ended: queue.SimpleQueue[Fetched] = queue.SimpleQueue()
 
     def request(self, address: str, now_us: int) -> None:
-        """Ask for what is under an address."""
+        """Request the text at an address."""
         self._thread.submit(partial(self._fetch, address))
 
     def take(self, now_us: int) -> tuple[Fetched, ...]:
-        """Take the requests that have ended."""
+        """Return the requests that have ended."""
         ended = []
         while not self._ended.empty():
             ended.append(self._ended.get_nowait())
         return tuple(ended)
 
     def close(self) -> None:
-        """End after the present request; nothing waits for that."""
+        """End the thread after the present request, without waiting for it."""
         self._thread.close()
 
     def _fetch(self, address: str) -> None:
@@ -74,13 +74,13 @@ class HttpSource:
 
 
 class _Received:
-    """What came, where a socket is wanted."""
+    """Received data as an object that can replace a socket."""
 
     def __init__(self, raw: bytes) -> None:
         self._raw = raw
 
     def makefile(self, mode: str) -> BytesIO:
-        """Return it as a file."""
+        """Return the data as a file."""
         return BytesIO(self._raw)
 
 
@@ -94,7 +94,7 @@ def _parts(address: str, hosts: tuple[str, ...]) -> SplitResult:
 
 
 def _exchange(parts: SplitResult, deadline_s: float) -> bytes:
-    """Ask, and return all that comes until the other end closes."""
+    """Send a request. Return all data until the other end closes the connection."""
     request = f"GET {parts.path or '/'} HTTP/1.0\r\nHost: {parts.netloc}\r\n\r\n"
     end = (str(parts.hostname), parts.port or 80)
     with socket.create_connection(end, _left_s(deadline_s)) as connection:

@@ -1,4 +1,4 @@
-"""InfraredRaysReader: lines of an infra-red reader become ucodes."""
+"""InfraredRaysReader, which converts lines of an infra-red reader into ucodes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ from tickrig.wire.ucode import BAUD, LineType, UcodeLine, parse_line
 # A host of an infra-red ucode reader that waits for nothing: look for rounds later.
 
 _SILENCE_US: Final = 1_000_000
-"""How long there may be no good line: ten rounds."""
+"""Longest time without a valid line, which is ten rounds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What a reader received in one round.
+    """The data of a reader in one round.
 
     Attributes:
-        number: number of the round that the reader counts, 0..65535.
-        ucodes: the nearest marker first, each with the level of its signal in per cent.
+        number: number of the round in the counter of the reader, 0..65535.
+        ucodes: received ucodes, each with the signal level in per cent. The nearest marker is
+            first.
         blinded: whether too much light prevented reception.
     """
 
@@ -40,14 +41,14 @@ class Round:
 
 
 class UcodeReaderClient:
-    """Starts a reader, and receives its rounds.
+    """A client that starts a reader, and receives its rounds.
 
-    A round with a lost or garbled line is left out. After each second without a valid line the
+    A round with a lost or garbled line is left out. After each second without a valid line, the
     reader is started again. Data that were on the line before the start are dropped, because the
     robot was at another place then.
 
     Args:
-        link: the line.
+        link: line to the reader.
 
     Raises:
         LinkClosed: the line is closed.
@@ -55,7 +56,7 @@ class UcodeReaderClient:
     Attributes:
         garbled: number of invalid lines.
         incomplete: number of rounds that were left out.
-        restarts: how often the reader was started again.
+        restarts: number of times that the reader was started again.
     """
 
     def __init__(self, link: Link[bytes]) -> None:
@@ -126,16 +127,16 @@ OPEN_SERIAL: Final[_OpenReader] = partial(SerialLink, baud=BAUD)
 
 
 class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
-    """Runs a reader while the component is Active, and writes the received ucodes of each round.
+    """A component that runs a reader while it is Active, and writes the ucodes of each round.
 
-    Ports: `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was received)
-    and `levels` of their signals in per cent. A reader that does not send is started again each
-    second. If the line is closed, the component goes to Error. The report (Fig. 123) has only its
-    name; ports and parameters are additions.
+    The ports are `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was
+    received) and `levels` of their signals in per cent. A reader that does not send is started
+    again each second. If the line is closed, the component goes to Error. The report (Fig. 123) has
+    only the name of the component. Ports and parameters are additions.
 
     Args:
         instance_name: name of the component.
-        open_link: opens the line; by pyserial unless given.
+        open_link: function that opens the line. By default, it is opened by pyserial.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("InfraredRaysReader", "Ucodes of infra-red markers")
@@ -149,12 +150,12 @@ class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
         self._was_silent = self._was_blinded = False
 
     def open_client(self) -> UcodeReaderClient:
-        """Open the line, and let the reader listen."""
+        """Open the line, and start the reader."""
         self._was_silent = self._was_blinded = False
         return UcodeReaderClient(self._open_link(self.device.value))
 
     def exchange(self, ec: ExecutionContext, client: UcodeReaderClient) -> None:
-        """Write the rounds that have come."""
+        """Write the rounds that have arrived."""
         restarts = client.restarts
         rounds = client.poll()
         for received in rounds:
@@ -166,7 +167,7 @@ class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
         self.levels.write(TimedLongSeq(now, tuple(level for _, level in received.ucodes)))
 
     def _watch(self, rounds: list[Round], silent: bool) -> None:
-        """Log in a line when the reader becomes silent or blinded, or comes back."""
+        """Log when the reader becomes silent or blinded, or when it works again."""
         if rounds:
             blinded = rounds[-1].blinded
             if blinded != self._was_blinded:

@@ -1,4 +1,4 @@
-"""What settlement and interpretation have in common: addresses, a cache, a source."""
+"""The common parts of settlement and interpretation: addresses, a cache, and a source."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tickrig.wire.rtc_types.rtc import Time, TimedLongSeq, TimedStringSeq
 _V = TypeVar("_V")
 
 _WAIT_US: Final = 2_000_000
-"""What comes later than this after it was wanted is not written: the robot is elsewhere."""
+"""Time after which a result is not written, because the robot is at another place."""
 
 _MOST_COUNTED: Final = 2**31 - 1
 _LOG: Final = log_of(__name__)
 
 
 class WantedUcode(NamedTuple):
-    """A ucode whose information is wanted: where that is, and when the ucode was received."""
+    """A ucode whose information is wanted, with its address, and the time of its reception."""
 
     ucode: str
     address: str
@@ -31,25 +31,25 @@ class WantedUcode(NamedTuple):
 
 
 class Lookup(RtComponent, Generic[_V]):
-    """Looks up each ucode that arrives: in its cache, else in a service.
+    """A component that looks up each arriving ucode in its cache, or else in a service.
 
     Periods do not wait for the service. A result that arrives in a later period is written in that
     period, with the time at which the ucode arrived. An entry older than `fresh` is requested
-    again. It remains in use until the service answers, up to `keep`. The cache is in memory: it is
-    kept in Inactive and Error, and lost when the component ends.
+    again. The entry remains in use until the service answers, up to `keep`. The cache is in memory.
+    It is kept in Inactive and Error, and lost when the component ends.
 
-    After each look-up and each answer the port `cache` gives these numbers: hits, hits that were
+    After each look-up and each answer, the port `cache` gives these numbers: hits, hits that were
     not fresh, misses, misses of ucodes that the service does not know, failed requests, entries,
     and the age in ms of the entry that answered last.
 
     Args:
         instance_name: name of the component.
-        in_port: name of its InPort.
+        in_port: name of the component's InPort.
         cache: settings of the cache.
-        open_source: creates the client of the service.
+        open_source: function that creates the client of the service.
 
     Attributes:
-        cache: the cached results.
+        cache: cache of the results.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Lookup(RtComponent, Generic[_V]):
         self._invalid = ""
 
     def _add_outputs(self) -> None:
-        """Add the port of the cache, behind those of a subclass."""
+        """Add the port of the cache after the ports of a subclass."""
         self.cache_state = self.add_port(OutPort("cache", TimedLongSeq))
 
     @abstractmethod
@@ -80,27 +80,30 @@ class Lookup(RtComponent, Generic[_V]):
 
     @abstractmethod
     def _write(self, found: list[tuple[WantedUcode, _V]]) -> None:
-        """Write what was found, one thing at least, all received at one time."""
+        """Write the results, of which there is at least one.
+
+        All have the same time of reception.
+        """
 
     @property
     def limits(self) -> CacheLimits:
-        """What the configuration says of the cache."""
+        """Limits of the cache in the configuration."""
         times = (self._fresh, self._keep, self._unknown, self._retry)
         return CacheLimits(self._entries.value, *(round(time.value * 1e6) for time in times))
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin to ask; also after Error."""
+        """Create the client of the service, also after Error."""
         self._close()
         self._source = self._open_source(self.instance_name, self._hosts.value)
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Ask no more."""
+        """Close the client of the service."""
         self._close()
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take what the service said, then look up what arrived."""
+        """Process answers of the service, then look up the arrived ucodes."""
         if (source := self._source) is None:
             return ReturnCode.RTC_ERROR
         before = self.cache.counts.total
@@ -126,7 +129,7 @@ class Lookup(RtComponent, Generic[_V]):
             self._write(found)
 
     def _write_late(self, address: str, now_us: int) -> None:
-        """Write what has come for a ucode that still is wanted."""
+        """Write the results of ucodes that are still wanted."""
         waiting, value = self._waiting.pop(address, None), self.cache.value(address)
         if waiting is not None and value is not None and now_us - waiting[1] <= _WAIT_US:
             self._write([(waiting[0], value)])
@@ -138,7 +141,7 @@ class Lookup(RtComponent, Generic[_V]):
         self.cache_state.write(TimedLongSeq(now, tuple(min(n, _MOST_COUNTED) for n in shown)))
 
     def _watch(self, now_us: int) -> None:
-        """Forget who waited too long; log in a line when the service fails or is back."""
+        """Drop ucodes that waited too long. Log when the service fails or works again."""
         for address, (_, wanted_us) in tuple(self._waiting.items()):
             if now_us - wanted_us > _WAIT_US:
                 del self._waiting[address]

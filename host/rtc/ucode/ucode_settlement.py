@@ -1,4 +1,4 @@
-"""UcodeSettlement: resolves a ucode to the address of its information."""
+"""UcodeSettlement, which resolves a ucode to the address of its information."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from tickrig.wire.ucode import parse_ucode
 
 _SERVICE: Final = "http://127.0.0.1:8640"
 _MOST_CHARACTERS: Final = 1_000
-"""Of an address."""
+"""Maximum number of characters of an address."""
 
 
 class UcodeSettlement(Lookup[str]):
-    """Resolves ucodes to the addresses of their information, at a resolution service.
+    """A component that resolves ucodes to the addresses of their information, at a service.
 
-    Ports: `ucodes` in; `addresses` out, which alternates a ucode and its address. The service has
-    the address as text under `SERVICE/ucodes/UCODE`. Invalid ucodes are counted in
-    `invalid_ucodes`. The report (Fig. 123) names the component and its cache; the rest is an
+    The ports are `ucodes` in, and `addresses` out, which alternates a ucode and its address. The
+    service has the address as text under `SERVICE/ucodes/UCODE`. Invalid ucodes are counted in
+    `invalid_ucodes`. The report (Fig. 123) names the component and its cache. The rest is an
     addition.
 
     Args:
         instance_name: name of the component.
-        open_source: creates the client of the service; HTTP by default.
+        open_source: function that creates the client of the service. By default, it is an HTTP
+            client.
 
     Attributes:
         invalid_ucodes: number of invalid words that arrived.
@@ -60,7 +61,7 @@ class UcodeSettlement(Lookup[str]):
 
 
 def parse_address(text: str) -> str:
-    """Return the address that a service gave.
+    """Return the address in an answer of the service.
 
     Raises:
         ValueError: the text is not an address.

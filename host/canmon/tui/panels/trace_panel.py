@@ -1,4 +1,4 @@
-"""The tab of the trace: a list of all frames, or the latest frame of each identifier.
+"""The tab of the trace, with a list of all frames, or the latest frame of each identifier.
 
 >>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
@@ -68,12 +68,12 @@ class TraceLines:
     """Settings of the text of rows.
 
     Attributes:
-        stamp: the time at the beginning of a line.
-        origin_us: the time that is 0.
+        stamp: format of the time at the beginning of a line.
+        origin_us: time that is displayed as 0.
         bits: whether to show bits instead of bytes.
-        meaning: whether to show the meaning of a frame after it.
-        channel_width: width of the bus name in characters; 0 for no name.
-        counts: whether to show the number of frames of an identifier before it.
+        meaning: whether to show the meaning of a frame after the frame.
+        channel_width: width of the bus name in characters, or 0 for no name.
+        counts: whether to show the number of frames of an identifier before the frame.
         gaps: whether to show the time since the previous frame with the same identifier.
     """
 
@@ -160,7 +160,7 @@ def _ident(row: TraceRow) -> tuple[str, str]:
 _CHANNEL_MAX: Final = 12
 _BOOKMARK: Final = "black on yellow"
 _BOOKMARKS: Final = 1_000
-"""As many are kept in a workspace."""
+"""Number of bookmarks that a workspace can hold."""
 _SILENT: Final = (
     "no frame comes: bit rate, cable, termination, power? F2 changes the settings.",
     "To ask all node-IDs: A, then f in the tab nodes; or in another terminal",
@@ -168,11 +168,11 @@ _SILENT: Final = (
 
 
 _GAPS_WIDTH: Final = 90
-"""A narrower screen has room for what frames mean, or for the gaps between them."""
+"""Width below which a screen shows either the meanings of frames, or the gaps between them."""
 
 
 class TracePanel(Panel):
-    """Frames as they come, filtered, decoded, with what changed in colour."""
+    """A list of arriving frames, filtered and decoded. Changed data are in colour."""
 
     title = "trace"
     section = "trace"
@@ -228,11 +228,11 @@ class TracePanel(Panel):
         self.query_one("#wanted").display = bool(self.filter_text)
 
     def follow(self) -> None:
-        """Take new rows of the trace."""
+        """Process new rows of the trace."""
         self._display_filter.follow()
 
     def snapshot(self, model: Model) -> None:
-        """Keep the rows that are in view."""
+        """Copy the visible rows."""
         view = self.query_one(LineView)
         passed, latest = self.paused or (self._display_filter.passed, self._display_filter.latest())
         self._fit(passed, latest)
@@ -259,7 +259,7 @@ class TracePanel(Panel):
         return line
 
     def paint(self) -> None:
-        """Show them; the latest one if it was in view."""
+        """Show the rows. Follow the latest row if it was in view."""
         view = self.query_one(LineView)
         follows = self._follows(view)
         if self._head != (head := self._title()):
@@ -270,7 +270,7 @@ class TracePanel(Panel):
             view.show_end()
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take mode, time stamp, filter and what is shown."""
+        """Load mode, time stamp, filter and displayed items."""
         self.overwrite = truth(settings, "overwrite", self.overwrite)
         stamp = choice(settings, "time", self.session.stamp, [str(one) for one in STAMPS])
         self.session.stamp = Stamp(stamp)
@@ -287,7 +287,7 @@ class TracePanel(Panel):
             raise SettingError(("filter",), str(error)) from None
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
+        """Return mode, time stamp, filter and displayed items."""
         return {
             "overwrite": self.overwrite,
             "time": str(self.session.stamp),
@@ -298,18 +298,18 @@ class TracePanel(Panel):
         }
 
     def apply_filter(self, text: str) -> None:
-        """Show only what a filter passes; FilterError if it is none."""
+        """Show only frames that pass a filter. Raise FilterError if the text is not a filter."""
         wanted: Filter | None = parse_filter(text) if text else None
         with self.session.lock:
             self._display_filter = DisplayFilter(self.session.model.trace, wanted)
         self.filter_text, self.paused, self._cursor = text, None, None
 
     def on_line_view_moved(self) -> None:
-        """Bring the lines that came into view."""
+        """Show the lines that came into view."""
         self.refresh_view()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Apply the filter, or say what is wrong with it."""
+        """Apply the filter, or show its error."""
         wrong = self.query_one("#wrong", Static)
         try:
             self.apply_filter(event.value.strip())
@@ -321,13 +321,13 @@ class TracePanel(Panel):
         self.action_leave()
 
     def action_filter(self) -> None:
-        """Write a filter."""
+        """Edit the filter."""
         field = self.query_one("#wanted", Input)
         field.display = True
         field.focus()
 
     def action_leave(self) -> None:
-        """Go back to the lines."""
+        """Return to the lines."""
         field = self.query_one("#wanted", Input)
         field.value, field.display = self.filter_text, bool(self.filter_text)
         self.query_one("#wrong").display = False
@@ -335,19 +335,19 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_pause(self) -> None:
-        """Hold the display, or continue; frames are recorded in both cases."""
+        """Pause or continue the display. Frames are recorded in both cases."""
         with self.session.lock:
             held = self._display_filter.passed.copy(), self._display_filter.latest()
         self.paused, self._cursor = (None, None) if self.paused else (held, None)
         self.refresh_view()
 
     def action_overwrite(self) -> None:
-        """Show the latest frame of each identifier, or all."""
+        """Show the latest frame of each identifier, or all frames."""
         self.overwrite = not self.overwrite
         self.refresh_view()
 
     def action_meaning(self) -> None:
-        """Show or hide what frames mean."""
+        """Show or hide the meanings of frames."""
         self._layout = replace(self._layout, meaning=not self._layout.meaning)
         self.refresh_view()
 
@@ -357,12 +357,12 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_stamp(self) -> None:
-        """Show another time: since the first frame, since the one before, absolute, date."""
+        """Show the next time format: since the first frame, since the last one, absolute, date."""
         self.session.next_stamp()
         self.refresh_view()
 
     def show_frame(self, at_us: int, record: AnyRecord | None = None) -> None:
-        """Hold the trace at a frame, or at the latest one until a time."""
+        """Pause the trace at a frame, or at the latest frame until a time."""
         if record is not None and self.filter_text and self._place(at_us, record) is None:
             self.apply_filter("")
             self.query_one("#wanted").display = False
@@ -374,7 +374,7 @@ class TracePanel(Panel):
         self._go(place)
 
     def _place(self, at_us: int, record: AnyRecord | None) -> int | None:
-        """Return the number of a row in the ring that is shown; None if it is not there."""
+        """Return the number of a row in the displayed ring, or None if it is not in the ring."""
         passed, place = self._passed(), None
         for number, row in enumerate(passed.rows(passed.first, passed.count), passed.first):
             if record is not None and (row.record is record or row.record == record):
@@ -388,7 +388,7 @@ class TracePanel(Panel):
             return self.paused[0] if self.paused else self._display_filter.passed.copy()
 
     def _go(self, number: int) -> None:
-        """Hold the picture, with a row in its middle."""
+        """Pause the display with a row in its middle."""
         if self.paused is None:
             with self.session.lock:
                 self.paused = self._display_filter.passed.copy(), self._display_filter.latest()
@@ -400,7 +400,7 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_find(self) -> None:
-        """Ask for a filter, and go to the next frame that it passes."""
+        """Ask for a filter, and go to the next frame that passes the filter."""
         self.query_one(PromptLine).prompt(
             "find, as 'node=3 and emcy' or 'sdo[6040h]'; then n next, N previous",
             self._wanted[0],
@@ -412,7 +412,7 @@ class TracePanel(Panel):
         self.action_again(1)
 
     def action_again(self, step: int) -> None:
-        """Go to the next frame that was asked for, or to the one before."""
+        """Go to the next or the previous frame that passes the searched filter."""
         text, wanted = self._wanted
         if wanted is not None:
             self._search(step, f"further {text}", lambda row: _passes(row, wanted))
@@ -420,7 +420,7 @@ class TracePanel(Panel):
             self.action_find()
 
     def action_bookmark(self) -> None:
-        """Mark the frame of the cursor, else the first in view, or unmark it."""
+        """Set or remove a bookmark at the frame of the cursor, or at the first visible frame."""
         passed, view = self._passed(), self.query_one(LineView)
         number = passed.first + view.top if self._cursor is None else self._cursor
         for row in passed.rows(number, 1):
@@ -428,11 +428,11 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_marked(self, step: int) -> None:
-        """Go to the next bookmark, or to the one before."""
+        """Go to the next or the previous bookmark."""
         self._search(step, "further bookmark", lambda row: row.record.at_us in self._bookmarks)
 
     def _search(self, step: int, what: str, fits: Callable[[TraceRow], bool]) -> None:
-        """Go to the next row that fits, or to the one before; behind the last comes the first."""
+        """Go to the next or previous row that fits. After the last row, continue with the first."""
         passed, begin = self._passed(), self._cursor
         if begin is None:
             begin = passed.first + self.query_one(LineView).top - (step > 0)
@@ -456,7 +456,7 @@ class TracePanel(Panel):
             self._go(self._passed().first + view.top + row)
 
     def action_clear(self) -> None:
-        """Start again."""
+        """Delete all rows."""
         with self.session.lock:
             self._display_filter.clear()
         self.paused = self._cursor = None
@@ -478,7 +478,7 @@ class TracePanel(Panel):
         return view.follows and self.paused is None
 
     def _fit(self, passed: Ring, latest: Sequence[Latest]) -> None:
-        """Make room for what is there: buses, and the first time."""
+        """Adapt the columns to the names of buses and to the first time."""
         buses = {one.row.record.channel for one in latest}
         width = min(_CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
         self._layout = replace(
@@ -498,12 +498,12 @@ class TracePanel(Panel):
 
 
 def _passes(row: TraceRow, wanted: Filter) -> bool:
-    """Return whether a frame passes a filter; an undecoded line of a serial port does not."""
+    """Return whether a frame passes a filter. An undecoded line of a serial port does not pass."""
     return row.decoded is not None and wanted.matches(row.record, row.decoded)
 
 
 def _times(settings: Mapping[str, Any], name: str) -> set[int]:
-    """Return times in microseconds; SettingError if they are none."""
+    """Return times in microseconds. Raise SettingError if they are invalid."""
     value = settings.get(name, [])
     if not isinstance(value, list) or not all(type(item) is int for item in value):
         raise SettingError((name,), "is no array of times in microseconds")
@@ -511,12 +511,12 @@ def _times(settings: Mapping[str, Any], name: str) -> set[int]:
 
 
 class _Follower(Task):
-    """The task that keeps a panel's rows up to date, whichever tab is shown."""
+    """Task that keeps the rows of a panel up to date, whichever tab is shown."""
 
     def __init__(self, panel: TracePanel) -> None:
         self._panel = panel
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Follow; it sends nothing."""
+        """Process new rows. Nothing is sent."""
         self._panel.follow()
         return ()

@@ -1,4 +1,4 @@
-"""All files that are written of a profile."""
+"""All files that are made from a profile."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def build(project: Project) -> dict[str, str]:
     """Return the text of each file by its name.
 
     Raises:
-        ValueError: names that Python or C cannot have.
+        ValueError: a name is not allowed in Python or C.
     """
     profile = project.profile
     check_identifiers(profile.type_name, (port.name for port in profile.ports))
@@ -44,7 +44,7 @@ def build(project: Project) -> dict[str, str]:
 
 
 def _write_fragment(project: Project) -> str:
-    """Return a System Definition that has this node alone; its ports keep their names."""
+    """Return a System Definition with only this node. Its ports keep their names."""
     profile = project.profile
     node = NodeEntry(
         project.node_id,
@@ -63,12 +63,12 @@ def _write_fragment(project: Project) -> str:
 
 
 def _sdo_type(kind: rtc_canopen.CanopenPortType[Any]) -> str | None:
-    """Return what a System Definition calls a type; the data type in the EDS says which Integer."""
+    """Return the name of a type in a System Definition. The EDS determines the type of Integer."""
     return None if kind.name == rtc_canopen.INTEGER else kind.name
 
 
 def _pdo_name(port: rtc_canopen.PlacedPort) -> str:
-    """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`; else `sdo`."""
+    """Return the name of a port's PDO in a System Definition, `tpdo1` or `rpdo1`, or else `sdo`."""
     if not port.number:
         return rtc_canopen.PortTransport.SDO.value
     kind = "rpdo" if port.profile.direction is rtc_canopen.PortDirection.IN else "tpdo"
@@ -87,7 +87,7 @@ PDO: Final = "{:<9} {:<9} {:<5} {}"
 
 
 def _summary(profile: rtc_canopen.RtcProfile, *, every: bool = False) -> Iterator[str]:
-    """Return the lines: objects of the ports, or `every` object, then the PDOs."""
+    """Return the lines with the objects of the ports, or with `every` object, and then the PDOs."""
     rows = [
         row
         for row in rtc_canopen.object_table(profile)
@@ -128,14 +128,14 @@ def _pdo(port: rtc_canopen.PlacedPort) -> str:
 def run_builder(
     path: Path, out: Path | None, warn: Callable[[str], None], *, force: bool, every: bool
 ) -> Iterator[str]:
-    """Check a profile and write its files; yield the lines that describe it.
+    """Check a profile and write its files. Yield the lines that describe the profile.
 
     Args:
-        path: the file of the profile.
-        out: folder for the files; nothing is written if left out.
-        warn: called with a line about each file that is kept.
-        force: overwrite a skeleton.
-        every: show every object, not only those of ports.
+        path: path of the profile.
+        out: folder for the files, or None to write no files.
+        warn: function that is called with a line about each file that is kept.
+        force: whether to overwrite an existing skeleton.
+        every: whether to show every object, and not only objects of ports.
     """
     project, files = _read_and_build(path)
     if out is not None:
@@ -158,7 +158,7 @@ def _read_and_build(path: Path) -> tuple[Project, dict[str, str]]:
 def _write_files(
     folder: Path, files: dict[str, str], warn: Callable[[str], None], *, force: bool
 ) -> None:
-    """Write the files; a skeleton that is there may have been filled and is kept."""
+    """Write the files. An existing skeleton is kept, because the user may have filled it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():

@@ -29,10 +29,10 @@ _C_TYPES: Final = {
     DataType.VISIBLE_STRING: "char",
     DataType.UNICODE_STRING: "uint16_t",
 }
-"""Data types of ports."""
+"""C types by the data types of ports."""
 
 NODE_ID: Final = 0x80
-"""Bit of `access` beside those of `Access`: the node-ID is added to the default."""
+"""Bit of `access`, in addition to those of `Access`: the node-ID is added to the default."""
 
 _TEMPLATE: Final = string.Template(Path(__file__).with_name("header.txt").read_text("utf-8"))
 

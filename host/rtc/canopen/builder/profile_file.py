@@ -32,7 +32,7 @@ _C_KEYWORDS: Final = frozenset(
         *("delete", "new", "operator", "private", "public", "template", "this", "throw", "virtual"),
     )
 )
-"""Reserved words of C, and those of C++ that may occur as names of ports."""
+"""Reserved words of C, and reserved words of C++ that may occur as names of ports."""
 
 COMPONENT_NAMES: Final = frozenset(
     (
@@ -42,14 +42,14 @@ COMPONENT_NAMES: Final = frozenset(
         *("vendor", "version"),
     )
 )
-"""What a component has beside its ports."""
+"""Attributes of a component in addition to its ports."""
 
 _IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport", "integer"))
-"""What the skeleton uses while it declares ports, beside the types."""
+"""Names that the skeleton uses while it declares ports, in addition to the types."""
 
 
 def python_name(name: str) -> str:
-    """Return the name of a component's attribute; a taken name or a constant gets an underscore.
+    """Return the name of a component's attribute. A taken name or a constant gets an underscore.
 
     >>> python_name("in"), python_name("target_um")
     ('in_', 'target_um')
@@ -59,12 +59,12 @@ def python_name(name: str) -> str:
 
 
 def c_name(name: str) -> str:
-    """Return a member of a struct in C."""
+    """Return the name of a member of a struct in C."""
     return f"{name}_" if name in _C_KEYWORDS else name
 
 
 def snake_name(name: str) -> str:
-    """Return a name in lower case, as files and constants need it.
+    """Return a name in lower case, as in names of files and constants.
 
     >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
     ('unsigned_long_long', 'gripper2')
@@ -73,7 +73,7 @@ def snake_name(name: str) -> str:
 
 
 def check_identifiers(type_name: str, ports: Iterable[str]) -> None:
-    """Raise ValueError if a name cannot be written down in Python and C."""
+    """Raise ValueError if a name is not allowed in Python and C."""
     if keyword.iskeyword(type_name):
         raise ValueError(f"name {type_name!r} is a keyword of Python")
     names = set(ports)
@@ -99,7 +99,7 @@ _DEFAULT_NODE_ID: Final = 16
 
 
 class _ProfileError(ValueError):
-    """A profile that cannot be used; one line says where and why."""
+    """A profile that cannot be used. The message is one line with place and reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ def parse_project(text: str) -> Project:
 
     Raises:
         _ProfileError: the file is not TOML, a key is unknown, a value has the wrong type, or no
-            DeviceRTC can have such a profile.
+            DeviceRTC can have this profile.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
 
@@ -153,7 +153,7 @@ def _tables(content: _Table) -> list[_Table]:
 
 
 def _port(number: int, table: _Table, word_bits: int) -> CanopenPortProfile:
-    """Read a port; errors say which of them."""
+    """Read a port. Errors name the port."""
     try:
         _check_keys(table, _PORT_KEYS)
         direction = _member(table, "direction", PortDirection)

@@ -1,4 +1,4 @@
-"""The skeleton of a DeviceRTC in Python: ports are there, callbacks wait for their bodies."""
+"""The skeleton of a DeviceRTC in Python, with its ports and with empty callbacks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CALLBACKS: Final = (
 )
 
 _LONGEST: Final = 88
-"""Characters of a line, as formatters have it."""
+"""Maximum number of characters of a line, as formatters use it."""
 
 
 def write_skeleton(project: Project) -> str:

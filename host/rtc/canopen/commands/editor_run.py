@@ -1,4 +1,4 @@
-"""What rtc-canopen-editor does, once its options are read; it needs the extra `tui`."""
+"""The work of rtc-canopen-editor after its options are read, which needs the extra `tui`."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def run_editor(
     """Serve a System Definition and edit it on the terminal.
 
     Args:
-        file: the definition.
-        log: file to which events are written, a line of JSON each.
-        components: components of users' files, as `Logger0=parts.py:Logger`.
-        start: activate all nodes.
-        bus_options: the bus of the command line.
+        file: path of the System Definition.
+        log: file to which events are written, with one line of JSON per event.
+        components: components in files of the user, such as `Logger0=parts.py:Logger`.
+        start: whether to activate all nodes.
+        bus_options: options of the bus on the command line.
     """
     if log == opening.STANDARD_OUTPUT:
         raise Refused("--log -: the screen is on standard output; name a file")

@@ -1,4 +1,4 @@
-"""What the command lines of a server do: read its files, open its bus, run it."""
+"""The common work of the server commands: reading files, opening the bus, running the server."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ from tickrig.wire.instant import NEVER
 # The control socket of a server.
 
 _NOT_HERE: Final = ("create", "delete", "save")
-"""Requests of a system that the server decides itself: its nodes come and go on the bus."""
+"""Requests of a system that the server decides itself, because its nodes come and go on the bus."""
 
 
 class ServerControl(SystemControl):
-    """Answers requests about one server: about its system, and about its nodes by node-ID.
+    """Control of one server. It answers requests about its system, and about its nodes by node-ID.
 
     Args:
-        server: the server; it must not tick during a request.
-        runner: runs the server.
+        server: server to control. The server must not tick during a request.
+        runner: runner of the server.
         bus: name of the bus.
     """
 
@@ -96,8 +96,8 @@ STANDARD_OUTPUT: Final = Path("-")
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
     """Make the server of a System Definition with its components.
 
-    Raises Refused if the definition or a component is not usable. Findings in EDS files that do
-    not prevent this are printed to standard error.
+    The function raises Refused if the definition or a component is not usable. Findings in EDS
+    files that do not prevent use are printed to standard error.
     """
     try:
         server = open_server(file)
@@ -111,11 +111,11 @@ def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
 
 
 def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
-    """Add components of users' files to a server.
+    """Add components in files of the user to a server.
 
     Args:
-        server: the server; the components run at the rate of its proxies.
-        words: the components, each as `Logger0=parts.py:Logger`.
+        server: server that gets the components. They run at the rate of the server's proxies.
+        words: components in the form `Logger0=parts.py:Logger`.
 
     Raises:
         ValueError: a component cannot be added.
@@ -136,12 +136,12 @@ def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
 def open_link(
     options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
 ) -> tuple[StampedLink, str]:
-    """Open the bus of a server; return the bus, and its name for people.
+    """Open the bus of a server. Return the bus, and its name as text.
 
     Args:
         options: the options that select the bus.
-        bus_state: called with each report of the CAN controller.
-        stack: closes the bus.
+        bus_state: function that is called with each report of the CAN controller.
+        stack: exit stack that closes the bus.
     """
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)
@@ -152,7 +152,7 @@ def open_link(
 
 
 def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
-    """Return the bus of the command line, that of the file where it names none."""
+    """Return the bus of the command line, or else the bus of the file."""
     if options or entry.channel is None:
         return options
     return replace(
@@ -164,7 +164,7 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield what writes events to a file, if there is one."""
+    """Yield a function that writes events to a file, if there is a file."""
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
     elif log is not None:
@@ -190,17 +190,17 @@ def _close(link: CanLink) -> None:
 # What rtc-canopen-server does, once its options are read.
 
 _QUICK_US: Final = 2_000
-"""So long at most a call of an engine waits for the bus."""
+"""Longest time that a call of an engine waits for the bus."""
 
 
 def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
     """Serve a System Definition, or check or draw it, depending on the options.
 
     Args:
-        file: the definition.
-        span_us: how long to serve it, us; `NEVER` for no end.
-        engines: the engines to join with.
-        options: the other options of the command line.
+        file: path of the System Definition.
+        span_us: time to serve the definition in us, or `NEVER` for no end.
+        engines: engines to join.
+        options: other options of the command line.
     """
     server = read_server(file, options.pop("components"))
     definition = server.definition
@@ -245,7 +245,7 @@ def _run(server: RtcCanopenServer, link: StampedLink, span_us: int, doors: _Door
 
 @dataclass(frozen=True, slots=True)
 class _Doors:
-    """By which others work with a server while it runs: a control socket, engines."""
+    """Connections of other programs to a running server: a control socket, and engines."""
 
     control: Path | None
     bus: str

@@ -1,4 +1,4 @@
-"""The System Editor: the nodes of a running server, their objects, and what joins them."""
+"""The System Editor of a running server, with nodes, their objects, and their connections."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _MARK: Final = "bold yellow"
 _ALARM: Final = "bold red"
 
 _STAMP: Final = 12
-"""Columns of a time."""
+"""Number of columns of a time."""
 
 _GOOD: Final = (
     ServerEventType.BOOT_UP,
@@ -53,7 +53,7 @@ _GOOD: Final = (
     ServerEventType.PDO_UNLINKED,
     ServerEventType.BUS_ON,
 )
-"""Events that are nothing to see to."""
+"""Events that need no attention."""
 
 
 def _event_lines(event: ServerEvent, width: int) -> list[Line]:
@@ -66,7 +66,7 @@ def _event_lines(event: ServerEvent, width: int) -> list[Line]:
 
 
 def _status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:
-    """Return what is served, where, and what is to be connected."""
+    """Return a line with the served definition, the bus, and the port to connect."""
     ready = sum(node.phase is NodePhase.READY for node in nodes)
     active = sum(node.proxy_state == "ACTIVE" for node in nodes)
     return (
@@ -78,7 +78,7 @@ def _status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) 
 
 PAINT_S: Final = 0.1
 _SWITCH_S: Final = 0.000_5
-"""How long the screen may keep the server from running."""
+"""Longest time that the screen may keep the server from running."""
 
 _EVENTS_SHOWN: Final = 500
 
@@ -94,10 +94,10 @@ _ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
 
 
 class SystemEditor(FramedApp):
-    """Shows a server and controls it by keys and mouse.
+    """Editor that shows a server and controls it by keys and mouse.
 
     Args:
-        session: the server; the caller of the app starts it.
+        session: session with the server. The caller of the app starts the session.
         bus: name of the bus.
     """
 
@@ -144,14 +144,14 @@ class SystemEditor(FramedApp):
         yield KeyFooter()
 
     def on_mount(self) -> None:
-        """Begin to paint."""
+        """Start updating the screen."""
         self.status.can_focus, self.events.border_title = False, "events"
         self.picture.display = False
         self.system.focus()
         self.set_interval(PAINT_S, self.look)
 
     def run_session(self) -> None:
-        """Run the server in a thread, and show it until the editor is left.
+        """Run the server in a thread, and show it until the user leaves the editor.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -167,7 +167,7 @@ class SystemEditor(FramedApp):
                 self.session.close()
 
     def look(self) -> None:
-        """Show how things are now; called ten times a second, and after each command."""
+        """Show the present state. This is called ten times a second, and after each command."""
         if self.session.ended:
             self.exit()
             return
@@ -200,27 +200,27 @@ class SystemEditor(FramedApp):
         self.picture.frame("system", self.picture.at)
 
     def on_system_picture_moved(self) -> None:
-        """Let the keys be about what is under the cursor of the picture."""
+        """Apply the keys to the item under the cursor of the picture."""
         self.system.go_to(self.picture.at)
         self.look()
 
     def on_cursor_view_moved(self) -> None:
-        """Show what belongs to the row under the cursor."""
+        """Show the data of the row under the cursor."""
         self.look()
 
     def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
-        """Write the object that was chosen; show what was folded or opened."""
+        """Write the chosen object, or fold or open the chosen row."""
         self.look()
         if event.view is self.objects:
             self.action_write()
 
     def action_request(self, what: str) -> None:
-        """Ask the proxy or component under the cursor for a state."""
+        """Request a state of the proxy or component under the cursor."""
         if (owner := self.system.owner) is not None:
             self._command(lambda view: _ASK[what](view, owner.name))
 
     def action_boot(self) -> None:
-        """Set the node up again, also one that was refused."""
+        """Set up the node again, even if it was refused."""
         if node_id := self.system.node_id:
             self._command(lambda view: view.boot(node_id))
 
@@ -229,13 +229,13 @@ class SystemEditor(FramedApp):
         self._command(ServerView.start)
 
     def action_mark(self) -> None:
-        """Mark a port or PDO, or let it go."""
+        """Mark a port or PDO, or remove the mark."""
         if not self.system.mark():
             self._refuse("ports and PDOs can be marked")
         self.look()
 
     def action_join(self, how: str) -> None:
-        """Join what is marked with what is under the cursor."""
+        """Connect the marked item with the item under the cursor."""
         marked, row = self.system.marked, self.system.row
         if marked is None or row is None:
             self._refuse("mark a port or PDO first (m)")
@@ -244,7 +244,7 @@ class SystemEditor(FramedApp):
             self.look()
 
     def action_remove(self) -> None:
-        """End the link or connection under the cursor; in the picture, one of the port."""
+        """End the link or connection under the cursor. In the picture, end one of the port."""
         if (row := self.system.row) is None:
             return
         if not (self.picture.display and isinstance(row.item, PortView)):
@@ -269,7 +269,7 @@ class SystemEditor(FramedApp):
             self.push_screen(ChoiceScreen(f"remove from {row.item.name}", rows), chosen)
 
     def action_picture(self) -> None:
-        """Show the system as a picture, or as a list again."""
+        """Show the system as a picture, or as a list."""
         shown = not self.picture.display
         self.picture.display, self.system.display = shown, not shown
         self.query_one("#panes").set_class(shown, "-pictured")
@@ -283,7 +283,7 @@ class SystemEditor(FramedApp):
             self.picture.go_to(row.name)
 
     def action_pdos(self) -> None:
-        """Show the PDOs of the node in whose rows the cursor is, and change them."""
+        """Show and edit the PDOs of the node whose rows contain the cursor."""
         if node_id := self.system.node_id:
             self.push_screen(PdoScreen(self.session, node_id))
         else:
@@ -297,13 +297,13 @@ class SystemEditor(FramedApp):
             self.look()
 
     def action_live(self) -> None:
-        """Read the objects in view again and again, or no more."""
+        """Read the visible objects repeatedly, or stop this."""
         if (objects := self.objects.objects) is not None:
             objects.live = not objects.live
             self.look()
 
     def action_write(self) -> None:
-        """Ask for a value, and write it."""
+        """Ask for a value, and write it to the object."""
         objects, row = self.objects.objects, self.objects.row
         if objects is None or row is None:
             return
@@ -317,11 +317,11 @@ class SystemEditor(FramedApp):
         self.push_screen(question, write)
 
     def action_save(self) -> None:
-        """Ask for a file, and save the definition with connections and links as they are."""
+        """Ask for a file, and save the definition with the present connections and links."""
         self._prompt_path("save the System Definition as", self.session.save)
 
     def action_load(self) -> None:
-        """Ask for a file, and serve the definition in it."""
+        """Ask for a file, and serve the definition in this file."""
         self._prompt_path("load the System Definition", self._load)
 
     def _load(self, path: Path) -> None:
@@ -337,7 +337,7 @@ class SystemEditor(FramedApp):
         self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
 
     def _command(self, command: _Command) -> bool:
-        """Send a command to the server; if it refuses, show the reason."""
+        """Send a command to the server. If the server refuses, show the reason."""
 
         def give() -> None:
             with self.session.lock:
@@ -346,7 +346,7 @@ class SystemEditor(FramedApp):
         return self._try(give)
 
     def _try(self, do: Callable[[], object]) -> bool:
-        """Do something; if it is refused, say why."""
+        """Call a function. If the server refuses, show the reason."""
         try:
             do()
         except (RtcRefused, ServerRefused, ValueError) as error:

@@ -1,4 +1,4 @@
-"""The objects of the node that was chosen."""
+"""The pane with the objects of the chosen node."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from tickrig.wire.canopen.eds.eds_value import parse_value
 from tickrig.wire.errors import FieldError
 
 _AT_ONCE: Final = 8
-"""Transfers that are under way; a command to the node waits for as many."""
+"""Number of running transfers. A command to the node waits for this number of transfers."""
 
 _FIRST_INDEX: Final = 0x1000
-"""Below are data types (CiA 301, object dictionary)."""
+"""First index of objects. Lower indices are data types (CiA 301, object dictionary)."""
 
 _NAME: Final = 30
-"""Columns of a name."""
+"""Number of columns of a name."""
 
 _DIM: Final = "bright_black"
 _ALARM: Final = "bold red"
@@ -38,17 +38,17 @@ _ObjectRow = CursorRow[Entry]
 
 
 class _NodeObjects:
-    """Reads the visible objects of a node by SDO, and writes them.
+    """The visible objects of a node, which are read and written by SDO.
 
     Each object is read once when it becomes visible, or repeatedly if the pane is live. An object
     that could not be read is read again only on request.
 
     Args:
-        node_id: the node.
-        eds: the content of its EDS.
+        node_id: node-ID of the node.
+        eds: content of the node's EDS.
 
     Attributes:
-        node_id: the node.
+        node_id: node-ID of the node.
         live: whether visible objects are read repeatedly.
     """
 
@@ -66,7 +66,7 @@ class _NodeObjects:
 
     @property
     def rows(self) -> list[_ObjectRow]:
-        """Its objects, by index."""
+        """The objects of the node by index."""
         texts = sorted(self._eds.texts.items())
         return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= _FIRST_INDEX]
 
@@ -74,7 +74,7 @@ class _NodeObjects:
         """Process results, and request missing values.
 
         Args:
-            view: sends commands to the server.
+            view: view that sends commands to the server.
             seen: the visible objects.
             answers: whether the node answers SDO requests.
         """
@@ -92,7 +92,7 @@ class _NodeObjects:
                 self._reading[entry] = view.read(self.node_id, *entry)
 
     def read(self, entry: Entry) -> None:
-        """Read an object in its turn."""
+        """Read an object when it is its turn."""
         self._problems.pop(entry, None)
         self._wanted.append(entry)
 
@@ -106,22 +106,22 @@ class _NodeObjects:
         self._writing.append((entry, view.write(self.node_id, *entry, data)))
 
     def text_of(self, entry: Entry) -> ObjectText:
-        """Return what is known of an object."""
+        """Return the description of an object."""
         return self._eds.texts[entry]
 
     def value_of(self, entry: Entry) -> str:
-        """Return the value as it can be written, empty if it is not known."""
+        """Return the value in the notation for writing, empty if it is unknown."""
         data = self._values.get(entry)
         return "" if data is None else _words_of(self.text_of(entry), data)
 
     def forget(self) -> None:
-        """Drop all values: the node has started again."""
+        """Drop all values, because the node has started again."""
         self._values.clear()
         self._problems.clear()
         self._changed.clear()
 
     def _due(self, seen: Collection[Entry]) -> list[Entry]:
-        """Return the visible objects to read, the oldest value first."""
+        """Return the visible objects to read. The object with the oldest value is first."""
         due = [
             entry
             for entry in seen
@@ -151,7 +151,7 @@ class _NodeObjects:
                 self.read(entry)
 
     def _kept_row(self, entry: Entry, text: ObjectText) -> _ObjectRow:
-        """Return the row of an object, formatted again if something changed."""
+        """Return the row of an object. The row is formatted again if something changed."""
         known = self._values.get(entry), self._problems.get(entry), entry in self._changed
         kept = self._rows.get(entry)
         if kept is None or kept[0] != known:
@@ -169,17 +169,19 @@ class _NodeObjects:
 
 
 def _reason(entry: Entry, transfer: PendingTransfer[bytes]) -> str:
-    """Return why a transfer failed, in the columns that a row of 80 leaves."""
+    """Return why a transfer failed, in the space that a row of 80 columns leaves."""
     return transfer.problem.removeprefix(f"{write_entry(entry)} ").removeprefix("aborted: ")
 
 
 def _tail(name: str) -> str:
-    """Return the end of a long name: members of a record begin alike."""
+    """Return the end of a long name, because members of a record have the same beginning."""
     return name if len(name) <= _NAME else f"…{name[1 - _NAME :]}"
 
 
 def _encode_words(text: ObjectText, words: str) -> bytes:
-    """Return the bytes of a value in EDS notation; ValueError if it does not fit its type.
+    """Return the bytes of a value in EDS notation.
+
+    Raise ValueError if the value does not fit the type.
 
     >>> _encode_words(ObjectText("mode", DataType.INTEGER8), "-2").hex()
     'fe'
@@ -205,10 +207,10 @@ def _words_of(text: ObjectText, data: bytes) -> str:
 
 
 class ObjectsPane(CursorView[Entry]):
-    """Shows the objects of one node at a time.
+    """A pane that shows the objects of one node at a time.
 
     Attributes:
-        objects: the objects of the node; None if no node is shown.
+        objects: objects of the node, or None if no node is shown.
     """
 
     HELP = """
@@ -226,12 +228,12 @@ class ObjectsPane(CursorView[Entry]):
         self.forget()
 
     def forget(self) -> None:
-        """Start with another system."""
+        """Clear the pane for another system."""
         self.objects: _NodeObjects | None = None
         self._of: dict[int, _NodeObjects] = {}
 
     def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
-        """Show the objects of a node from now on, 0 for none; reads its EDS the first time."""
+        """Show the objects of a node from now on, or none for 0. The EDS is read the first time."""
         if node_id and node_id not in self._of:
             self._of[node_id] = _read(node_id, eds[node_id])
         self.objects = self._of.get(node_id)
@@ -250,12 +252,12 @@ class ObjectsPane(CursorView[Entry]):
         self.title = f"objects of {node.node_id} {node.name}{live}"
 
     def paint_objects(self) -> None:
-        """Show what is known of them."""
+        """Show the known data of the objects."""
         self.offer([] if self.objects is None else self.objects.rows)
 
 
 def _read(node_id: int, path: Path) -> _NodeObjects:
-    """Return the objects of an EDS; none if it is there no more."""
+    """Return the objects of an EDS, or none if the file no longer exists."""
     try:
         return _NodeObjects(node_id, read_eds_objects(path, node_id))
     except (OSError, EdsError):

@@ -1,4 +1,4 @@
-"""The PDOs of one node: what they carry, how they are sent, and their links."""
+"""The screen for the PDOs of one node, with mapping, transmission, and links."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _CHANGED: Final = "bold yellow"
 _GOOD: Final = "bold green"
 _ALARM: Final = "bold red"
 _NAME: Final = 40
-"""Columns of the name of an object."""
+"""Number of columns of the name of an object."""
 
 _BIT_RATE: Final = 1_000_000
-"""In a DCF, if the System Definition gives none."""
+"""Bit rate in a DCF if the System Definition does not give a bit rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class _PdoPlace:
 
     Attributes:
         index: index of the communication parameter of the PDO.
-        entry: position in its mapping, from 0; -1 for the PDO itself.
+        entry: position in the mapping, from 0, or -1 for the PDO itself.
     """
 
     index: int
@@ -56,9 +56,9 @@ def _pdo_rows(
     """Return the rows of the PDOs of a node.
 
     Args:
-        node_id: the node.
-        pdos: the PDOs as the node has them.
-        wanted: the PDOs that were changed on this screen.
+        node_id: node-ID of the node.
+        pdos: PDOs that the node has.
+        wanted: PDOs that were changed on this screen.
         names: names of objects, by index and sub-index.
         links: PDO links of the whole system.
     """
@@ -97,14 +97,14 @@ def _pdo_line(
 
 
 class PdoScreen(ModalScreen[None]):
-    """Shows the PDOs of a node and changes them; changes reach the node when they are written.
+    """A screen that shows the PDOs of a node. Changes reach the node when they are written.
 
     Args:
-        session: the server.
-        node_id: the node.
+        session: session with the server.
+        node_id: node-ID of the node.
 
     Attributes:
-        pdos: the PDOs as the node has them; empty before they were read.
+        pdos: PDOs that the node has, empty before they were read.
         wanted: PDOs that were changed and are not written yet.
     """
 
@@ -143,7 +143,7 @@ class PdoScreen(ModalScreen[None]):
         self._read_once = self._warned = self._busy_hit = False
 
     def compose(self) -> ComposeResult:
-        """Lay it out."""
+        """Lay out the screen."""
         yield self.view
         yield self.status
         yield KeyFooter()
@@ -157,7 +157,7 @@ class PdoScreen(ModalScreen[None]):
     # What is shown, and what came of transfers.
 
     def look(self) -> None:
-        """Show how things are now; called ten times a second, and after each command."""
+        """Show the present state. This is called ten times a second, and after each command."""
         if not self.is_mounted:
             return
         with self._session.lock:
@@ -201,7 +201,7 @@ class PdoScreen(ModalScreen[None]):
         return plain(" as in the node", _DIM)
 
     def _take(self) -> None:
-        """Take what has come of transfers."""
+        """Process the results of transfers."""
         if (reading := self._reading) is not None and reading.done:
             self._reading = None
             if reading.problem:
@@ -243,20 +243,20 @@ class PdoScreen(ModalScreen[None]):
     # Keys.
 
     def action_read(self) -> None:
-        """Read the PDOs again; what was changed here stays."""
+        """Read the PDOs again. Changes on this screen are kept."""
         if not self._is_busy():
             self._says = plain("")
             self._read()
 
     def action_insert(self) -> None:
-        """Ask for an object, and put it behind the entry under the cursor, or last in the PDO."""
+        """Ask for an object, and insert it after the entry under the cursor, or last in the PDO."""
         if (at := self._at()) is not None:
             pdo = self.wanted.get(at.index, self.pdos[at.index])
             place = len(pdo.mapping) if at.entry < 0 else at.entry + 1
             self._choose_object(at, place, insert=True)
 
     def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
-        """Replace the entry under the cursor; of a PDO, ask for its COB-ID."""
+        """Replace the entry under the cursor. For a PDO, ask for its COB-ID."""
         event.stop()
         if (at := self._at()) is None:
             return
@@ -266,7 +266,7 @@ class PdoScreen(ModalScreen[None]):
             self._choose_object(at, at.entry, insert=False)
 
     def on_cursor_view_moved(self, event: CursorView.Moved) -> None:
-        """Keep it from the screen below."""
+        """Stop the event, so that the screen below does not get it."""
         event.stop()
 
     def action_remove(self) -> None:
@@ -298,14 +298,14 @@ class PdoScreen(ModalScreen[None]):
             self._change(at.index, pdo_edit.switched)
 
     def action_undo(self) -> None:
-        """Take back all changes that are not written."""
+        """Undo all changes that are not written."""
         if not self._is_busy():
             self.wanted.clear()
             self._says = plain("")
             self.look()
 
     def action_write(self) -> None:
-        """Write what was changed to the node."""
+        """Write the changes to the node."""
         if self._is_busy():
             return
         if not self.wanted:
@@ -319,7 +319,7 @@ class PdoScreen(ModalScreen[None]):
         self._command(write)
 
     def action_link(self) -> None:
-        """Cut the links of the PDO under the cursor, or ask for one of another node to link it."""
+        """Remove the links of the PDO under the cursor, or ask which PDO to link with it."""
         if (at := self._at()) is None:
             return
         if self.wanted:
@@ -364,7 +364,7 @@ class PdoScreen(ModalScreen[None]):
             self._refuse("no other node has a PDO of the other direction that is on")
 
     def action_save(self) -> None:
-        """Ask for a file, and save what the node has as a DCF."""
+        """Ask for a file, and save the values of the node as a DCF."""
         if self._is_busy():
             return
         with self._session.lock:
@@ -381,7 +381,7 @@ class PdoScreen(ModalScreen[None]):
         self.app.push_screen(QuestionScreen("save the node as DCF", str(path)), answered)
 
     def action_load(self) -> None:
-        """Ask for a DCF, and take its PDOs as changes."""
+        """Ask for a DCF, and use its PDOs as changes."""
         if self._is_busy() or self._at() is None or (file := self._file) is None:
             return
 
@@ -402,7 +402,7 @@ class PdoScreen(ModalScreen[None]):
         self.app.push_screen(QuestionScreen("load the PDOs of a DCF", ""), answered)
 
     def action_leave(self) -> None:
-        """Leave; changes that are not written are asked about once."""
+        """Leave the screen. Ask once if there are changes that are not written."""
         if self.wanted and not self._warned:
             self._warned = True
             self._refuse(f"{len(self.wanted)} changed, not written: w writes, again leaves")
@@ -412,7 +412,7 @@ class PdoScreen(ModalScreen[None]):
     # How they do it.
 
     def _at(self) -> _PdoPlace | None:
-        """Return the row under the cursor, None if nothing can be changed now."""
+        """Return the row under the cursor, or None if nothing can be changed now."""
         if self._is_busy():
             return None
         if self.view.row is None:
@@ -472,7 +472,7 @@ class PdoScreen(ModalScreen[None]):
         self.app.push_screen(QuestionScreen(f"{text} {name}", shown(pdo)), answered)
 
     def _change(self, index: int, change: Callable[[PdoDescription], PdoDescription]) -> None:
-        """Change a PDO here; the node has it when it is written."""
+        """Change a PDO on this screen. The node gets the change when it is written."""
         if index not in self.pdos:  # removed by a later read
             return
         try:

@@ -17,28 +17,28 @@ from tickrig.host.rtc.canopen.view import ServerView
 from tickrig.wire.can import ErrorState, Frames
 
 _LONGEST_US: Final = 10_000
-"""So soon is done what was asked for."""
+"""Longest time until a request is executed."""
 
 AddComponents = Callable[[RtcCanopenServer], None]
-"""Puts components of others beside the proxies."""
+"""Function that adds other components to a server."""
 
 
 class EditorSession:
-    """Runs the server of a System Definition; each definition needs a new server.
+    """A session that runs the server of a System Definition. Each definition needs a new server.
 
     Hold `lock` to access the server.
 
     Args:
-        server: the server.
-        path: its System Definition.
-        link: the bus.
-        add_components: adds components to each server that is loaded.
-        listeners: called with the events of each server.
+        server: server to run.
+        path: path of the System Definition.
+        link: connection to the bus.
+        add_components: function that adds components to each loaded server.
+        listeners: functions that are called with the events of each server.
 
     Attributes:
-        lock: protects the server.
+        lock: lock that protects the server.
         path: file from which the System Definition was last read, or to which it was saved.
-        server: the server.
+        server: running server.
     """
 
     def __init__(
@@ -59,22 +59,22 @@ class EditorSession:
 
     @property
     def view(self) -> ServerView:
-        """Looks at the server, and commands it."""
+        """View that reads the server and sends it commands."""
         return ServerView(self.server)
 
     @property
     def ended(self) -> bool:
-        """Whether something ended the thread."""
+        """Whether an error ended the thread."""
         return self._thread is not None and self._thread.done()
 
     @property
     def eds_paths(self) -> dict[int, Path]:
-        """The EDS of each node, by node-ID."""
+        """The EDS of each node by node-ID."""
         nodes = self.server.definition.nodes
         return {node.id: self._folder / node.eds for node in nodes}
 
     def load(self, path: Path) -> None:
-        """Serve another definition, after leaving the nodes of the present one.
+        """Serve another definition, after leaving the nodes of the present definition.
 
         Raises:
             DefinitionError: the definition or an EDS cannot be used.
@@ -88,18 +88,24 @@ class EditorSession:
             self.server, self.path, self._folder = server, path, path.parent
 
     def save(self, path: Path) -> None:
-        """Save the definition with connections and links as they are now; OSError if it cannot."""
+        """Save the definition with the present connections and links.
+
+        Raise OSError if that fails.
+        """
         with self.lock:
             definition = self.view.definition()
         save_definition(definition, self._folder, path)
         self.path = path
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Tell the server what its CAN controller reports."""
+        """Pass the report of the CAN controller to the server."""
         self.server.bus_state(state)
 
     def turn(self, until_us: int) -> None:
-        """Wait for frames or the next due time, not beyond a time, and tick the server."""
+        """Wait for frames or the next due time, until a time at the latest.
+
+        Then tick the server.
+        """
         link = self._link
         due_us = min(self.server.due_us, until_us)
         now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
@@ -110,11 +116,11 @@ class EditorSession:
             link.send(sent)
 
     def start(self) -> None:
-        """Begin to work, in a thread."""
+        """Start the thread."""
         self._thread = self._pool.submit(self._run)
 
     def close(self) -> None:
-        """End the thread, and leave the nodes; LinkClosed if the bus is gone."""
+        """End the thread, and leave the nodes. Raise LinkClosed if the bus is gone."""
         self._stop.set()
         self._pool.shutdown()
         if self._thread is not None:

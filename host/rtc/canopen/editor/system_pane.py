@@ -1,4 +1,4 @@
-"""The tree of nodes, components and what joins them."""
+"""The tree of nodes, components and their connections."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ALARM: Final = "bold red"
 _MARK: Final = "bold yellow"
 
 _KEPT_ROWS: Final = 4_096
-"""More than 127 nodes have; a row that is the same is not written again."""
+"""Number of cached rows. 127 nodes have fewer rows, and an unchanged row is not written again."""
 
 _FOLDED: Final = "▸ "
 _OPEN: Final = "▾ "
@@ -42,7 +42,7 @@ _OPEN: Final = "▾ "
 def _system_rows(
     system: SystemView, folded: Collection[str] = (), marked: str = ""
 ) -> list[_SystemRow]:
-    """Return the rows.
+    """Return the rows of the tree.
 
     Args:
         system: the system to show.
@@ -147,7 +147,7 @@ def _joints(system: SystemView) -> Iterator[_SystemRow]:
 
 
 def boxes_and_edges(system: SystemView) -> tuple[list[Box], list[Edge]]:
-    """Return what a picture shows: nodes and components, connections, and links past the PC."""
+    """Return the content of a picture: nodes, components, connections, and links without the PC."""
     boxes, port_of = list[Box](), dict[PdoName, str]()
     owners: tuple[_Owner, ...] = (*system.nodes, *system.components)
     for one in owners:
@@ -181,7 +181,7 @@ def joints(system: SystemView, port: PortView) -> list[PdoLink | RtConnection]:
 
 
 def connect(view: ServerView, first: Item, second: Item) -> None:
-    """Join two ports through the PC; ServerRefused or RtcRefused if they do not fit."""
+    """Connect two ports through the PC. Raise ServerRefused or RtcRefused if they do not fit."""
     if not (isinstance(first, PortView) and isinstance(second, PortView)):
         raise ServerRefused("through the PC go ports: mark one, go to another")
     out, in_ = (first, second) if first.out else (second, first)
@@ -189,7 +189,7 @@ def connect(view: ServerView, first: Item, second: Item) -> None:
 
 
 def link(view: ServerView, first: Item, second: Item) -> None:
-    """Link a TPDO with an RPDO, without the PC; ServerRefused if they do not fit."""
+    """Link a TPDO with an RPDO without the PC. Raise ServerRefused if they do not fit."""
     ends = [
         one.pdo if isinstance(one, PortView) else one.name
         for one in (first, second)
@@ -205,7 +205,7 @@ def link(view: ServerView, first: Item, second: Item) -> None:
 
 
 def remove(view: ServerView, item: Item) -> None:
-    """End a link or connection; ServerRefused if it is none."""
+    """End a link or connection. Raise ServerRefused for any other key."""
     match item:
         case PdoLink(source, target):
             view.unlink(source, target)
@@ -216,12 +216,12 @@ def remove(view: ServerView, item: Item) -> None:
 
 
 class SystemPane(CursorView[Item]):
-    """Shows a system; commands apply to the row under the cursor.
+    """A pane that shows a system. Commands apply to the row under the cursor.
 
     Attributes:
         folded: keys of rows whose sub-rows are hidden.
-        marked: the port or PDO that is to be connected.
-        node_id: the node in whose rows the cursor was last; 0 for no node.
+        marked: port or PDO that is to be connected.
+        node_id: node whose rows contained the cursor last, or 0 for no node.
     """
 
     HELP = """
@@ -245,21 +245,21 @@ class SystemPane(CursorView[Item]):
         self.forget()
 
     def forget(self) -> None:
-        """Start with another system."""
+        """Clear the pane for another system."""
         self.folded: set[str] = set()
         self.marked: _SystemRow | None = None
         self.node_id, self.cursor = 0, 0
 
     @property
     def owner(self) -> _Owner | None:
-        """The node or component in whose rows the cursor is; None among what joins them."""
+        """The node or component whose rows contain the cursor, or None for connections."""
         if self.row is None or isinstance(self.row.item, PdoLink | RtConnection):
             return None
         above = (row.item for row in reversed(self.rows_shown[: self.cursor + 1]))
         return next(item for item in above if isinstance(item, _Owner))
 
     def look(self, system: SystemView) -> None:
-        """Show how things are now."""
+        """Show the present state."""
         self.offer(_system_rows(system, self.folded, self.marked.key if self.marked else ""))
         match self.owner:
             case NodeView() as node:
@@ -275,7 +275,10 @@ class SystemPane(CursorView[Item]):
                 return
 
     def mark(self) -> bool:
-        """Mark the port or PDO under the cursor, or let it go; False if it is none."""
+        """Mark the port or PDO under the cursor, or remove the mark.
+
+        Return False for other rows.
+        """
         row = self.row
         if row is None or not isinstance(row.item, PdoView | PortView):
             return False
@@ -283,12 +286,12 @@ class SystemPane(CursorView[Item]):
         return True
 
     def action_enter(self) -> None:
-        """Fold or open what is under the cursor."""
+        """Fold or open the item under the cursor."""
         if self.row is not None:
             self.action_fold(self.row.key not in self.folded)
 
     def action_fold(self, folded: bool) -> None:
-        """Show the node or component under the cursor without what it has, or with it."""
+        """Hide or show the rows below the node or component under the cursor."""
         if self.row is not None and isinstance(self.row.item, _Owner):
             (self.folded.add if folded else self.folded.discard)(self.row.key)
             self.post_message(self.Entered(self))

@@ -19,20 +19,20 @@ INTERFACE: Final = "SDOPackage.Configuration"
 
 _WIDGETS: Final = "__widget__"
 _CONSTRAINTS: Final = "__constraints__"
-"""Sets that say how an editor shows the parameters, and what they may be (OpenRTM-aist)."""
+"""Sets with the editor widgets and constraints of the parameters (OpenRTM-aist)."""
 
 
 class ConfigurationServant:
-    """The servant of a configuration; its methods are the operations of the IDL.
+    """The servant of a configuration. Its methods are the operations of the IDL.
 
     A change is checked as a whole and takes effect in the next period. Two more sets, `__widget__`
     and `__constraints__`, describe the parameters to editors. These sets cannot be changed.
 
-    Not emulated: parameters outside of sets, services and organizations that peers add.
+    Not emulated: parameters outside of sets, and services and organizations that peers add.
 
     Args:
-        configuration: the configuration.
-        calls: runs calls in the manager's thread.
+        configuration: configuration to serve.
+        calls: queue that runs calls in the manager's thread.
         stubs: stubs of Tickrig's IDL.
     """
 
@@ -44,20 +44,20 @@ class ConfigurationServant:
         return self._calls.call(lambda: [self._set(*item) for item in self._sets().items()])
 
     def get_configuration_set(self, config_id: str) -> Any:
-        """Return a set; NotAvailable without it."""
+        """Return a set. Raise NotAvailable if there is no such set."""
         return self._calls.call(lambda: self._found(config_id))
 
     def get_active_configuration_set(self) -> Any:
-        """Return the set whose values hold."""
+        """Return the set whose values apply."""
         return self._calls.call(lambda: self._found(self._configuration.active_id))
 
     def set_configuration_set_values(self, configuration_set: Any) -> bool:
-        """Change values of a set that is there, all or none."""
+        """Change values of an existing set, either all values or none."""
         set_id, values = configuration_set.id, _values(configuration_set)
         return self._changed(lambda: self._change(set_id, values))
 
     def add_configuration_set(self, configuration_set: Any) -> bool:
-        """Add a set; False if one has its ID."""
+        """Add a set. Return False if another set has its ID."""
         set_id, values = configuration_set.id, _values(configuration_set)
 
         def add() -> bool:
@@ -69,27 +69,27 @@ class ConfigurationServant:
         return self._changed(add)
 
     def remove_configuration_set(self, config_id: str) -> bool:
-        """Remove a set, but not the default one and that which is active."""
+        """Remove a set, except the default set and the active set."""
         return self._changed(lambda: self._configuration.remove_set(config_id))
 
     def activate_configuration_set(self, config_id: str) -> bool:
-        """Let the values of a set hold."""
+        """Activate a set, so that its values apply."""
         return self._changed(lambda: self._configuration.activate(config_id))
 
     def get_configuration_parameters(self) -> list[Any]:
-        """Return none: all parameters are in sets."""
+        """Return no parameters, because all parameters are in sets."""
         return []
 
     get_configuration_parameter_values = get_configuration_parameters
 
     def get_configuration_parameter_value(self, name: str, *_: object) -> Any:
-        """Refuse: there is none."""
+        """Refuse the request, because there is no parameter outside of sets."""
         raise self._sdo.InvalidParameter(f"no parameter {name!r} outside of sets")
 
     set_configuration_parameter = get_configuration_parameter_value
 
     def set_device_profile(self, profile: Any) -> bool:
-        """Refuse, as all that follow."""
+        """Refuse the request, as all following operations do."""
         return False
 
     add_service_profile = remove_service_profile = set_device_profile
@@ -122,7 +122,7 @@ class ConfigurationServant:
         self._configuration.add_set(set_id, {**before, **values})
 
     def _changed(self, change: Callable[[], bool | None]) -> bool:
-        """Make a change; InvalidParameter says why it cannot be."""
+        """Make a change. If it is impossible, raise InvalidParameter with the reason."""
         try:
             return self._calls.call(change) is not False
         except RtcRefused as error:
@@ -130,7 +130,7 @@ class ConfigurationServant:
 
 
 def _values(configuration_set: Any) -> dict[str, str]:
-    """Return the values of a set as text, whatever type they came with."""
+    """Return the values of a set as text, whatever their type is."""
     values = {}
     for item in configuration_set.configuration_data:
         value = omni_any.from_any(item.value)

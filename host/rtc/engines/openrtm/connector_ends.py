@@ -1,4 +1,4 @@
-"""Our end of a connector of service ports: calls both ways (OpenRTM-aist 1.x, CorbaPort)."""
+"""The local end of a connector, which makes and receives calls (OpenRTM-aist 1.x, CorbaPort)."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from tickrig.wire.rtc_types.cdr import Endian
 # Properties of ports and connectors: NVLists of CORBA, and the texts in them.
 
 _Properties = list[Any]
-"""An NVList: each has a `name` and a `value`, an Any."""
+"""An NVList. Each item has a `name` and a `value`, which is an Any."""
 
 ENDIAN: Final = "dataport.serializer.cdr.endian"
 DATA_TYPE: Final = "dataport.data_type"
 INTERFACE: Final = "dataport.interface_type"
 CORBA_CDR: Final = "corba_cdr"
 _DIRECT: Final = "direct"
-"""Between ports of one process; saved systems have it, and rtresurrect asks for it again."""
+"""Interface type between ports of one process, for saved systems and rtresurrect."""
 
 _BOTH: Final = ",".join(Endian)
 
 
 def texts(properties: _Properties) -> dict[str, str]:
-    """Return what the properties say that are texts or numbers; others mean nothing here."""
+    """Return the properties that are texts or numbers. Other properties have no meaning here."""
     found: dict[str, str] = {}
     for item in properties:
         value = item.value.value()
@@ -50,7 +50,7 @@ def texts(properties: _Properties) -> dict[str, str]:
 
 
 def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
-    """Return properties with some values; all others pass as they came."""
+    """Return properties with some values changed. Other properties are unchanged."""
     kept = [item for item in properties if item.name not in values]
     return kept + nvlist(values)
 
@@ -61,7 +61,7 @@ def completed(properties: _Properties) -> _Properties:
 
 
 def agreed_endian(text: str) -> Endian:
-    """Return the first known byte order of a list; little if the list is empty.
+    """Return the first known byte order of a list, or little endian if the list is empty.
 
     Raises:
         RtcRefused: no byte order of the list is known.
@@ -89,7 +89,7 @@ def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
 
 
 def offered(port: DataPort[Any]) -> dict[str, str]:
-    """Return what a data port offers to peers; rtcon compares it with what theirs offers."""
+    """Return the properties that a data port offers to peers. rtcon compares them with a peer's."""
     subscriptions = "Any" if isinstance(port, InPort) else "flush,new,periodic"
     return {
         "port.port_type": port.port_type,
@@ -105,16 +105,16 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ConnectorPlace:
-    """The surroundings of a connector: ORB, threads and names.
+    """The environment of a connector: ORB, threads and names.
 
     Attributes:
         orb: the ORB of this process.
-        calls: runs calls in the manager's thread.
-        threads: the threads that call peers, for all data ports.
-        post: schedules a call in the manager's thread before the next tick.
+        calls: queue that runs calls in the manager's thread.
+        threads: threads that call peers, for all data ports.
+        post: function that schedules a call in the manager's thread before the next tick.
         connector_id: ID of the connector.
-        name: name of the connector, for people.
-        peer: name of the peer's port, for people.
+        name: name of the connector, for display.
+        peer: name of the peer's port, for display.
     """
 
     orb: Orb
@@ -126,15 +126,15 @@ class ConnectorPlace:
     peer: str
 
     def end(self, properties: dict[str, str]) -> peer_ports.PeerEnd:
-        """Return the peer's end with the properties that hold."""
+        """Return the peer's end with the properties that apply."""
         return peer_ports.PeerEnd(self.peer, self.connector_id, properties, self.name)
 
 
 class ConnectorEnd(ABC):
-    """The local end of a connector; it belongs to the manager's thread.
+    """The local end of a connector. It belongs to the manager's thread.
 
     Attributes:
-        thread: calls the peer, one call after the other; None until it is started.
+        thread: thread that calls the peer, one call after the other, or None until it is started.
     """
 
     def __init__(self, place: ConnectorPlace) -> None:
@@ -144,7 +144,7 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve the object that the peer is to call.
+        """Serve the object that the peer will call.
 
         Args:
             values: properties of the connector.
@@ -158,7 +158,7 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Store the object of the peer that is to be called, and join the connector.
+        """Store the object of the peer that this end will call, and join the connector.
 
         This method does not call the peer.
 
@@ -176,21 +176,21 @@ class ConnectorEnd(ABC):
         self._served.clear()
 
     def calling_thread(self) -> PeerThread:
-        """Return the thread that calls the peer."""
+        """Return the thread that makes calls to the peer."""
         if self.thread is None:
             self.thread = PeerThread(self._place.peer)
         return self.thread
 
     def serve(self, interface: str, answers: object) -> str:
-        """Serve an object until the end; return its IOR."""
+        """Serve an object until the end of the connector. Return its IOR."""
         self._served.append(self._place.orb.serve(stubs().skeleton(interface), answers))
         return self._place.orb.text(self._served[-1])
 
     def reference(self, ior: str, kind: Any) -> Reference:
         """Return the reference in an IOR, narrowed to an interface.
 
-        No request asks the peer whether it has this interface. The IOR names the interface; if that
-        is wrong, the first call ends with an error.
+        No request asks the peer whether it has this interface. The IOR names the interface. If the
+        IOR is wrong, the first call ends with an error.
 
         Raises:
             RtcRefused: the text is not a reference.
@@ -209,17 +209,17 @@ class ConnectorEnd(ABC):
 _LOG: Final = log_of(__name__)
 
 _GONE: Final = (CORBA.TRANSIENT, CORBA.TIMEOUT, CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST)
-"""Exceptions that mean no answer of a peer; all others are answers."""
+"""CORBA exceptions that mean that a peer did not answer. All other exceptions are answers."""
 
 _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
 
 
 class NoAnswerError(Exception):
-    """A peer is not there, hangs, or has no such object any more."""
+    """A peer is not running, hangs, or no longer has the object."""
 
 
 class _Complaints:
-    """Logs the first of what a peer does wrong, and again after it did something right."""
+    """A log of a peer's faults. The first fault is logged, and again the first after a success."""
 
     def __init__(self, peer: str) -> None:
         self._peer, self._complained = peer, False
@@ -233,18 +233,18 @@ class _Complaints:
         self._complained = False
 
     def raised(self, error: CORBA.SystemException) -> None:
-        """Take what a call raised; NoAnswerError if that is no answer."""
+        """Process the exception of a call. Raise NoAnswerError if it is not an answer."""
         if isinstance(error, _GONE):
             raise NoAnswerError(explain(error)) from None
         self.wrong(f"the peer answers with {type(error).__name__}")
 
 
 class InPortClient:
-    """Puts values into the InPort of a peer (OpenRTM-aist, InPortCorbaCdrConsumer).
+    """A client that puts values into the InPort of a peer (OpenRTM-aist, InPortCorbaCdrConsumer).
 
     Args:
         reference: reference of an InPortCdr.
-        peer: name of the peer's port, for people.
+        peer: name of the peer's port, for display.
     """
 
     def __init__(self, reference: Reference, peer: str) -> None:
@@ -252,7 +252,7 @@ class InPortClient:
         self._complaints = _Complaints(peer)
 
     def put(self, payload: bytes) -> PortStatus:
-        """Put a value; NoAnswerError if there was none."""
+        """Put a value. Raise NoAnswerError if the peer does not answer."""
         try:
             status = self._put(payload)
         except CORBA.SystemException as error:
@@ -263,11 +263,11 @@ class InPortClient:
 
 
 class _OutPortClient:
-    """Gets values from the OutPort of a peer (OpenRTM-aist, OutPortCorbaCdrConsumer).
+    """A client that gets values from the OutPort of a peer (OpenRTM-aist, OutPortCorbaCdrConsumer).
 
     Args:
         reference: reference of an OutPortCdr.
-        peer: name of the peer's port, for people.
+        peer: name of the peer's port, for display.
     """
 
     def __init__(self, reference: Reference, peer: str) -> None:
@@ -275,7 +275,10 @@ class _OutPortClient:
         self._complaints = _Complaints(peer)
 
     def get(self) -> bytes | None:
-        """Get a value, None if there is none; NoAnswerError without an answer."""
+        """Get a value, or None if there is none.
+
+        Raise NoAnswerError if the peer does not answer.
+        """
         try:
             status, payload = self._get()
         except CORBA.BAD_PARAM:  # OpenRTM-aist-Python 2.1.0 returns "" for an empty buffer
@@ -300,7 +303,7 @@ class _Get(Protocol):
 
 
 class InPortAnswers:
-    """The operations of InPortCdr, carried out by a connector."""
+    """The operations of InPortCdr, executed by a connector."""
 
     def __init__(self, connector: _Put) -> None:
         self._put, self._theirs = connector.put, _theirs()
@@ -311,7 +314,7 @@ class InPortAnswers:
 
 
 class _OutPortAnswers:
-    """The operations of OutPortCdr, carried out by a connector."""
+    """The operations of OutPortCdr, executed by a connector."""
 
     def __init__(self, connector: _Get) -> None:
         self._get, self._theirs = connector.get, _theirs()
@@ -323,13 +326,13 @@ class _OutPortAnswers:
 
 
 def _theirs() -> dict[PortStatus, Any]:
-    """Return OpenRTM's status for each of ours; it has no word for some."""
+    """Return the OpenRTM status for each local status. OpenRTM lacks some of them."""
     openrtm = stubs().openrtm
     return {one: getattr(openrtm, one.name, openrtm.UNKNOWN_ERROR) for one in PortStatus}
 
 
 def _ours(status: Any) -> PortStatus:
-    """Return our status for one of OpenRTM's; `UNKNOWN_ERROR` is an error."""
+    """Return the local status for an OpenRTM status. `UNKNOWN_ERROR` is an error."""
     return PortStatus.__members__.get(str(status), PortStatus.PORT_ERROR)
 
 
@@ -346,8 +349,8 @@ class DataEnd(ConnectorEnd):
     which the peer pulls. An end that calls the peer subscribes.
 
     Args:
-        place: the surroundings of the connector.
-        port: the local port.
+        place: environment of the connector.
+        port: local port of the connector.
     """
 
     def __init__(self, place: ConnectorPlace, port: InPort[Any] | OutPort[Any]) -> None:
@@ -356,7 +359,7 @@ class DataEnd(ConnectorEnd):
         self._connector: ConnectorBase | None = None
 
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve InPortCdr or OutPortCdr, if the peer calls."""
+        """Serve InPortCdr or OutPortCdr, if the peer makes the calls."""
         end, codec = self._agree(values)
         port, pulls = self._port, end.options.dataflow is DataflowType.PULL
         if isinstance(port, InPort) and not pulls:
@@ -372,7 +375,7 @@ class DataEnd(ConnectorEnd):
         return {}
 
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Reach the peer's InPortCdr or OutPortCdr, if we call."""
+        """Connect to the peer's InPortCdr or OutPortCdr, if this end makes the calls."""
         if self._connector is None:
             self._connector = self._calling(values)
             self._connector.begin()
@@ -398,7 +401,7 @@ class DataEnd(ConnectorEnd):
 
 
 _OPERATIONS: Final[Mapping[str, tuple[str, ...]]] = {"RefHard": ("Go", "Stop")}
-"""Interface types of our IDL: operations without arguments and without a result."""
+"""Interface types in Tickrig's IDL, with their operations that have no arguments and no result."""
 
 
 class ServiceEnd(ConnectorEnd):
@@ -410,8 +413,8 @@ class ServiceEnd(ConnectorEnd):
     Not emulated: interfaces whose operations have arguments or results.
 
     Args:
-        place: the surroundings of the connector.
-        port: the local port.
+        place: environment of the connector.
+        port: local port of the connector.
     """
 
     def __init__(self, place: ConnectorPlace, port: ServicePort) -> None:
@@ -419,7 +422,7 @@ class ServiceEnd(ConnectorEnd):
         self._port = port
 
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve what our port provides, under the names that OpenRTM 1.0 and later look for."""
+        """Serve the interfaces of the local port under the names for OpenRTM 1.0 and later."""
         found: dict[str, str] = {}
         for provider in self._port.providers:
             if (operations := _OPERATIONS.get(provider.profile.type_name)) is not None:
@@ -430,7 +433,10 @@ class ServiceEnd(ConnectorEnd):
         return found
 
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Join a port that stands for the peer's: it provides what was published, and calls."""
+        """Join a port that represents the peer's port.
+
+        It has the published interfaces, and calls them.
+        """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:
             wanted = provider.profile
@@ -449,7 +455,7 @@ class ServiceEnd(ConnectorEnd):
         return _Calls(reference, _OPERATIONS[wanted.type_name], self.calling_thread(), watch)
 
     def _ior(self, wanted: InterfaceProfile, values: dict[str, str]) -> str:
-        """Return the reference for an interface that our port requires, empty without one."""
+        """Return the reference for an interface that the local port requires, empty without one."""
         for text in self._candidates(wanted, values):
             if text and text not in {"null", "nil"}:
                 return text
@@ -468,7 +474,7 @@ class ServiceEnd(ConnectorEnd):
 
 
 class _Answers:
-    """Carries operations out in the manager's thread."""
+    """Operations that are executed in the manager's thread."""
 
     def __init__(self, servant: object, operations: tuple[str, ...], calls: CallQueue) -> None:
         for name in operations:
@@ -476,7 +482,7 @@ class _Answers:
 
 
 class _Calls:
-    """Makes operations calls into a peer, in its thread."""
+    """Operations that become calls to a peer, made in the thread of the peer."""
 
     def __init__(
         self,
@@ -491,7 +497,7 @@ class _Calls:
 
 
 def _call(operation: Callable[[], None], watch: peer_ports.PeerWatch) -> None:
-    """Call a peer, in its thread."""
+    """Call a peer in its thread."""
     try:
         operation()
     except CORBA.SystemException as error:

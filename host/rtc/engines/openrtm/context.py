@@ -35,11 +35,11 @@ class ServantReferences:
     Entries are added and removed in the manager's thread. Any thread may look them up.
 
     Args:
-        orb: serves them.
+        orb: ORB that serves the objects.
         stubs: stubs of Tickrig's IDL.
-        calls: runs calls in the manager's thread.
-        fixed: whether only this process creates and ends components; peers cannot do so, and
-            cannot move a component to another execution context.
+        calls: queue that runs calls in the manager's thread.
+        fixed: whether only this process creates and ends components. Peers cannot do so, and cannot
+            move a component to another execution context.
     """
 
     def __init__(self, orb: Orb, stubs: Stubs, calls: CallQueue, *, fixed: bool = False) -> None:
@@ -57,28 +57,28 @@ class ServantReferences:
         return reference
 
     def remove(self, thing: RtComponent | ExecutionContext) -> None:
-        """Stop accepting calls for it."""
+        """Stop accepting calls for a component or execution context."""
         if (entry := self._by_id.pop(id(thing), None)) is not None:
             del self._by_key[self.orb.key(entry.reference)]
             self.orb.withdraw(entry.reference)
 
     def of(self, thing: RtComponent | ExecutionContext | None) -> Reference:
-        """Return its reference; nil (None) if peers cannot call it."""
+        """Return the reference of an object, or nil (None) if peers cannot call it."""
         entry = self._by_id.get(id(thing))
         return None if entry is None else entry.reference
 
     def all_of(self, things: Iterable[RtComponent | ExecutionContext]) -> list[Reference]:
-        """Return the references of those that peers can call."""
+        """Return the references of the objects that peers can call."""
         return [reference for thing in things if (reference := self.of(thing)) is not None]
 
     def find(self, reference: Reference) -> RtComponent | ExecutionContext | None:
-        """Return what a reference stands for; None if that is not here."""
+        """Return the object of a reference, or None if the object is not local."""
         key = self.orb.key(reference)
         entry = self._by_key.get(key) if key else None
         return None if entry is None else entry.thing
 
     def code(self, code: ReturnCode) -> Any:
-        """Return a code as the stubs have it."""
+        """Return a return code in the type of the stubs."""
         return self.stubs.rtc.ReturnCode_t._item(int(code))
 
 
@@ -103,17 +103,17 @@ def _calling(name: str) -> Callable[[AttachedContexts, int], Any]:
 
 
 class AttachedContexts:
-    """The execution contexts of a component, for peers; its methods are operations of the IDL.
+    """The execution contexts of a component, for peers. Its methods are operations of the IDL.
 
-    A peer attaches an execution context of its own and then calls `on_activated`, `on_execute` and
-    so on with the handle that it received. The callback sees this context with the time of the
-    manager; the peer manages its rate and states. Peers cannot call callbacks for local contexts:
-    PRECONDITION_NOT_MET.
+    A peer attaches an execution context of its own, and then calls `on_activated`, `on_execute` and
+    so on with the handle that it received. The callback gets this context with the time of the
+    manager. The peer manages its rate and states. For local contexts, calls of callbacks by peers
+    return PRECONDITION_NOT_MET.
 
     Args:
-        component: the owner of the contexts.
-        manager: provides the time.
-        references: of the local execution contexts.
+        component: component that owns the contexts.
+        manager: manager that provides the time.
+        references: references of the local execution contexts.
     """
 
     def __init__(
@@ -125,34 +125,34 @@ class AttachedContexts:
         self._next = _FOREIGN
 
     def get_owned_contexts(self) -> list[Reference]:
-        """Return those that end with the component."""
+        """Return the execution contexts that end with the component."""
         return self._calls.call(lambda: self._references.all_of(self._component.own_contexts))
 
     def get_participating_contexts(self) -> list[Reference]:
-        """Return all others that it takes part in."""
+        """Return all other execution contexts in which the component takes part."""
         peers = (reference for reference, _ in self._foreign.values())
         return self._calls.call(lambda: [*self._references.all_of(self._others()), *peers])
 
     def get_context(self, exec_handle: int) -> Reference:
-        """Return the context of a handle; nil if there is none."""
+        """Return the context of a handle, or nil if there is none."""
         return self._calls.call(lambda: self._by_handle().get(exec_handle))
 
     def get_context_handle(self, cxt: Reference) -> int:
-        """Return the handle of a context; -1 if the component takes no part in it."""
+        """Return the handle of a context, or -1 if the component does not take part in it."""
         return self._calls.call(lambda: self._handle(cxt))
 
     def is_alive(self, exec_context: Reference) -> bool:
-        """Return whether the component lives, and takes part in that context."""
+        """Return whether the component is alive and takes part in the context."""
         return self._calls.call(
             lambda: self._component.alive and self._handle(exec_context) != _NONE
         )
 
     def attach_context(self, exec_context: Reference) -> int:
-        """Take part in a context of a peer; the answer is its handle, -1 for nil."""
+        """Take part in a context of a peer. Return the handle of the context, or -1 for nil."""
         return self._calls.call(lambda: self._attach(exec_context))
 
     def detach_context(self, exec_handle: int) -> Any:
-        """Take part in a context of a peer no more."""
+        """Stop taking part in a context of a peer."""
         return self._calls.call(lambda: self._detach(exec_handle))
 
     def call(self, exec_handle: int, name: str) -> Any:
@@ -230,23 +230,23 @@ def move(
     request: Request,
     timeout_us: int = CALL_TIMEOUT_US,
 ) -> ReturnCode:
-    """Request a move and wait for its end; in any thread but that of the manager.
+    """Request a move and wait for its end. Call this in any thread but that of the manager.
 
     Args:
-        calls: runs calls in the manager's thread.
-        context: the execution context.
-        component: a participant of the context.
-        request: `ExecutionContext.activate_component`, `deactivate_component` or
-            `reset_component`.
-        timeout_us: how long to wait, first for the manager's thread, then for the end.
+        calls: queue that runs calls in the manager's thread.
+        context: execution context of the component.
+        component: component that takes part in the context.
+        request: method that requests the move: `ExecutionContext.activate_component`,
+            `deactivate_component` or `reset_component`.
+        timeout_us: time to wait, first for the manager's thread, then for the end.
 
     Returns:
-        The result of the request if it is refused; RTC_OK if the component is in the requested
-        state; RTC_ERROR if the callback failed, the component went to another state, or did not
-        reach the requested state in time.
+        The result of the request if it is refused. Otherwise, RTC_OK if the component is in the
+        requested state, or RTC_ERROR if the callback failed, the component went to another state,
+        or did not reach the requested state in time.
 
     Raises:
-        TimeoutError: the manager's thread had no time; then the move was not requested.
+        TimeoutError: the manager's thread had no time. The move was then not requested.
         RtcRefused: the system has ended.
     """
     wanted, future = _WANTED[request], Future[ReturnCode]()
@@ -278,14 +278,14 @@ INTERFACE = "RTC.ExecutionContextService"
 
 
 class ExecutionContextServant:
-    """An execution context, for peers; its methods are the operations of the IDL.
+    """An execution context, for peers. Its methods are the operations of the IDL.
 
-    Activating, deactivating and resetting wait for the new state, up to 1 s, as in OpenRTM.
-    Components of other processes cannot join it: UNSUPPORTED.
+    Activating, deactivating and resetting wait for the new state up to 1 s, as in OpenRTM.
+    Components of other processes cannot join the context. Such requests return UNSUPPORTED.
 
     Args:
-        context: the execution context.
-        owner: the component with which the context ends, if there is one.
+        context: execution context to serve.
+        owner: component with which the context ends, or None.
         references: references of the components.
     """
 
@@ -300,23 +300,23 @@ class ExecutionContextServant:
         return self._calls.call(self._profile)
 
     def is_running(self) -> bool:
-        """Return whether it runs."""
+        """Return whether the context runs."""
         return self._calls.call(lambda: self._context.running)
 
     def start(self) -> Any:
-        """Start it."""
+        """Start the context."""
         return self._code(self._context.start)
 
     def stop(self) -> Any:
-        """Stop it."""
+        """Stop the context."""
         return self._code(self._context.stop)
 
     def get_rate(self) -> float:
-        """Return its rate in Hz."""
+        """Return the rate of the context in Hz."""
         return self._calls.call(lambda: self._context.rate_hz)
 
     def set_rate(self, rate: float) -> Any:
-        """Change its rate, in Hz."""
+        """Change the rate of the context in Hz."""
         return self._code(lambda: self._context.set_rate(rate))
 
     def get_kind(self) -> Any:
@@ -324,27 +324,27 @@ class ExecutionContextServant:
         return self._rtc.PERIODIC
 
     def add_component(self, comp: Reference) -> Any:
-        """Let a component take part."""
+        """Add a component to the context."""
         return self._of_component(comp, self._context.add_component)
 
     def remove_component(self, comp: Reference) -> Any:
-        """Let a component take part no more."""
+        """Remove a component from the context."""
         return self._of_component(comp, self._context.remove_component)
 
     def activate_component(self, comp: Reference) -> Any:
-        """Bring a component from Inactive to Active."""
+        """Move a component from Inactive to Active."""
         return self._move(comp, ExecutionContext.activate_component)
 
     def deactivate_component(self, comp: Reference) -> Any:
-        """Bring a component from Active to Inactive."""
+        """Move a component from Active to Inactive."""
         return self._move(comp, ExecutionContext.deactivate_component)
 
     def reset_component(self, comp: Reference) -> Any:
-        """Bring a component from Error to Inactive."""
+        """Move a component from Error to Inactive."""
         return self._move(comp, ExecutionContext.reset_component)
 
     def get_component_state(self, comp: Reference) -> Any:
-        """Return the state of a component; Created if it takes no part."""
+        """Return the state of a component, or Created if it does not take part."""
         component = self._references.find(comp)
         if not isinstance(component, RtComponent):
             return self._rtc.CREATED_STATE

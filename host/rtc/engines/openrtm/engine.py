@@ -1,4 +1,4 @@
-"""The components of a manager as RTCs of OpenRTM, for as long as it runs."""
+"""An engine that serves the components of a manager as RTCs of OpenRTM while it runs."""
 
 # Theory of operation
 #
@@ -61,19 +61,19 @@ class _Served:
 
 
 class _OpenRtmEngine:
-    """Registers the components of a manager with a name server, and serves them to peers.
+    """An engine that registers a manager's components with a name server, and serves them to peers.
 
     Create and close the engine in the manager's thread.
 
     Args:
-        options: addresses and names.
-        rtcs: the manager.
-        calls: runs calls in its thread.
-        stop: called to end the process if a peer requests that.
+        options: addresses and names of the engine.
+        rtcs: manager of the components.
+        calls: queue that runs calls in the manager's thread.
+        stop: function that ends the process if a peer requests that.
         fixed: whether peers cannot create or end components.
 
     Raises:
-        OrbFailed: no ORB can be made at that address.
+        OrbFailed: no ORB can be made at the address.
         RtcRefused: the stubs cannot be made, or the path of a remote component is invalid.
     """
 
@@ -105,7 +105,7 @@ class _OpenRtmEngine:
         self._peers = Peers(self._ports, rtcs)
 
     def close(self) -> None:
-        """Take the names away, answer the calls that run, and refuse all others."""
+        """Remove the names, answer the running calls, and refuse all other calls."""
         self._rtcs.on_added.remove(self._add)
         self._rtcs.on_removed.remove(self._remove)
         self._peers.close()
@@ -174,7 +174,7 @@ def openrtm_joined(
     *,
     fixed: bool,
 ) -> Iterator[None]:
-    """Let the components of a manager take part in a system of OpenRTM; see `_OpenRtmEngine`."""
+    """Let the components of a manager join a system of OpenRTM; see `_OpenRtmEngine`."""
     engine = _OpenRtmEngine(options, rtcs, calls, stop, fixed=fixed)
     try:
         yield

@@ -24,22 +24,22 @@ _UNSET: Final = (
     *("modules.config_path", "modules.preload", "modules.init_func_prefix"),
     *("modules.init_func_suffix", "modules.download_allowed", "modules.abs_path_allowed"),
 )
-"""What rtcat misses of a profile where it is not there."""
+"""Keys of a profile that rtcat requires."""
 
 _RATE: Final = "exec_cxt.periodic.rate"
 
 
 class ManagerServant:
-    """The servant of a manager; its methods are the operations of the IDL.
+    """The servant of a manager. Its methods are the operations of the IDL.
 
-    It creates and deletes components of the types that its process knows, and ends the process.
-    Operations on modules, other managers and settings are not supported: they return UNSUPPORTED
-    or empty lists.
+    The servant creates and deletes components of the types that its process knows, and ends the
+    process. Operations on modules, other managers and settings are not supported. They return
+    UNSUPPORTED or empty lists.
 
     Args:
-        manager: the manager.
+        manager: manager to serve.
         references: references of components.
-        stop: called to end the process.
+        stop: function that ends the process.
     """
 
     def __init__(
@@ -53,11 +53,14 @@ class ManagerServant:
         return self._calls.call(lambda: self._references.all_of(self._manager.components))
 
     def get_component_profiles(self) -> list[Any]:
-        """Return what there is to know of them."""
+        """Return the profiles of the components."""
         return [component.get_component_profile() for component in self.get_components()]
 
     def create_component(self, module_name: str) -> Reference:
-        """Create a component of `TYPE?instance_name=NAME&...`; nil if that cannot be."""
+        """Create a component from `TYPE?instance_name=NAME&...`.
+
+        Return nil if that is impossible.
+        """
         type_name, _, rest = module_name.partition("?" if "?" in module_name else "&")
         options = dict(_option(word) for word in rest.split("&") if word)
         return self._calls.call(lambda: self._create(type_name, options))
@@ -77,15 +80,15 @@ class ManagerServant:
         return self._references.code(self._calls.call(delete))
 
     def get_profile(self) -> Any:
-        """Return how it is called."""
+        """Return the name and description of the manager."""
         return self._rtm.ManagerProfile(nvlist(self._profile()))
 
     def get_configuration(self) -> list[Any]:
-        """Return its settings."""
+        """Return the settings of the manager."""
         return nvlist({f"manager.{key}": text for key, text in self._profile().items()})
 
     def get_factory_profiles(self) -> list[Any]:
-        """Return the types of components that it can create."""
+        """Return the types of components that the manager can create."""
         names = self._calls.call(lambda: self._manager.types)
         facts = {"language": "Python", "lang_type": "SCRIPT"}
         return [
@@ -94,13 +97,13 @@ class ManagerServant:
         ]
 
     def get_loadable_modules(self) -> list[Any]:
-        """Return none, as those that follow."""
+        """Return an empty list, as the following operations do."""
         return []
 
     get_loaded_modules = get_master_managers = get_slave_managers = get_loadable_modules
 
     def is_master(self) -> bool:
-        """Return True: there is no master manager."""
+        """Return True, because there is no other master manager."""
         return True
 
     def shutdown(self) -> Any:
@@ -109,7 +112,7 @@ class ManagerServant:
         return self._references.code(ReturnCode.RTC_OK)
 
     def fork(self, *_: object) -> Any:
-        """Refuse, as all that follow."""
+        """Refuse the request, as all following operations do."""
         return self._references.code(ReturnCode.UNSUPPORTED)
 
     restart = set_configuration = load_module = unload_module = fork
@@ -117,7 +120,7 @@ class ManagerServant:
     add_slave_manager = remove_slave_manager = fork
 
     def get_service(self, name: str) -> Reference:
-        """Return nil: there is none."""
+        """Return nil, because there is no service."""
         return None
 
     def _profile(self) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The names of components in a CORBA name server, for as long as they live."""
+"""The names of components in a CORBA name server while the components live."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
 _RENEW_US: Final = 10_000_000
-"""OpenRTM's `naming.update.interval`: so soon a name server that was restarted is filled again."""
+"""OpenRTM's `naming.update.interval`. A restarted name server is filled again within this time."""
 
 _LOOK_US: Final = 1_000_000
 _CLOSE_US: Final = 2_500_000
@@ -25,16 +25,16 @@ _LOG: Final = log_of(__name__)
 
 
 class NameServer:
-    """Keeps names bound in a name server, in its own thread, so that callers do not wait.
+    """A client that keeps names bound in a name server. Its own thread does the waiting.
 
-    All names are bound again every 10 s, and as soon as a name server that did not answer answers
-    again; both events are logged.
+    All names are bound again every 10 s, and also as soon as a name server answers again after it
+    did not answer. Both events are logged.
 
     Args:
         orb: the ORB of this process.
         address: address of the name server.
         renew_us: interval at which all names are bound.
-        look_us: retry interval while it does not answer.
+        look_us: retry interval while the name server does not answer.
 
     Attributes:
         answers: whether the name server accepted the latest names.
@@ -52,10 +52,10 @@ class NameServer:
         self._thread.submit(self._look)
 
     def bind(self, path: str, reference: Reference) -> None:
-        """Bind a name to an object, and keep it bound; another object with this name loses it.
+        """Bind a name to an object and keep it bound. Another object with this name loses the name.
 
         Args:
-            path: such as `robot.host_cxt/ConsoleIn0.rtc`.
+            path: path of the name, such as `robot.host_cxt/ConsoleIn0.rtc`.
             reference: reference of the object.
         """
         with self._lock:
@@ -64,14 +64,14 @@ class NameServer:
         self._submit(lambda root: self._bind(root, path, reference))
 
     def unbind(self, path: str) -> None:
-        """Take a name away, unless another object has it by now."""
+        """Remove a name, unless another object has the name by now."""
         with self._lock:
             if (reference := self._bound.pop(path, None)) is not None:
                 self._gone[path] = reference
         self._submit(self._unbind_gone)
 
     def close(self) -> None:
-        """Take all names away; a name server that does not answer keeps them."""
+        """Remove all names. A name server that does not answer keeps the names."""
         with self._lock:
             self._gone |= self._bound
             self._bound.clear()
@@ -79,7 +79,7 @@ class NameServer:
         self._thread.close(_CLOSE_US)
 
     def _submit(self, change: Callable[[Any], None]) -> None:
-        """Change names at once; while there is no answer, `_look` does that when there is one."""
+        """Change names at once. While there is no answer, `_look` changes them later."""
 
         def call() -> None:
             if self.answers:
@@ -88,13 +88,13 @@ class NameServer:
         self._thread.submit(call)
 
     def _look(self) -> float:
-        """Bind all names if that is due; asked for again and again, in the thread."""
+        """Bind all names if that is due. The thread calls this repeatedly."""
         if not self.answers or time.monotonic() >= self._due_s:
             self._call(self._renew)
         return self._thread.retry_s
 
     def _call(self, change: Callable[[Any], None]) -> None:
-        """Change names; where there is no answer, that is noted."""
+        """Change names. If there is no answer, record this."""
         try:
             change(self._root())
         except CORBA.SystemException as error:
@@ -158,7 +158,7 @@ class NameServer:
 
 
 class _NoNameServiceError(Exception):
-    """Who answers is no name service."""
+    """The server that answers is not a name service."""
 
 
 def _make_contexts(root: Any, name: list[Any]) -> None:
@@ -170,7 +170,7 @@ def _make_contexts(root: Any, name: list[Any]) -> None:
 
 
 def name_of(path: str) -> list[Any]:
-    """Return a path as the name service has it: ID and kind, which follows the last dot."""
+    """Return a path in the form of the name service, with ID, and kind after the last dot."""
     parts = (part.rpartition(".") for part in path.split("/"))
     return [
         CosNaming.NameComponent(*((id_, kind) if dot else (kind, ""))) for id_, dot, kind in parts

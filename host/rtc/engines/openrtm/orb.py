@@ -1,4 +1,4 @@
-"""The ORB of this process: where it listens, what it serves, how long it waits for peers."""
+"""The ORB of this process, with its address, its objects, and its time limits for peers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tickrig.host.rtc.system.peer_thread import calls_run
 from tickrig.host.text.log import log_of
 
 Reference = Any
-"""A reference to a CORBA object, here or elsewhere."""
+"""A reference to a CORBA object, in this process or another one."""
 
 _CALL_TIMEOUT_MS: Final = 1_000
 _CLOSE_S: Final = 2.0
@@ -29,7 +29,10 @@ _POLL_S: Final = 0.005
 _LOG: Final = log_of(__name__)
 
 _NOT_CARRIED: Final = re.compile("[\0\ud800-\udfff]")
-"""NUL ends a string of CORBA, and half of a surrogate pair is no character of UTF-8."""
+"""Characters that CORBA cannot carry.
+
+NUL ends a string, and half of a surrogate pair is no character.
+"""
 
 _REFUSALS: Final = {
     ReturnCode.BAD_PARAMETER: CORBA.BAD_PARAM,
@@ -47,22 +50,22 @@ _REASONS: Final = {
 
 
 class _OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
-    """There can be no ORB here."""
+    """No ORB can be made in this process."""
 
 
 class Orb:
-    """The ORB; a process can have one ORB of omniORB, and another one after this was closed.
+    """The ORB of this process. A process can have one ORB of omniORB, and another after closing it.
 
-    A call into a peer that does not answer ends after 1 s with `CORBA.TRANSIENT`.
+    A call to a peer that does not answer ends after 1 s with `CORBA.TRANSIENT`.
 
     Args:
-        endpoint: address at which it listens.
+        endpoint: address at which the ORB listens.
 
     Attributes:
-        endpoint: as given.
+        endpoint: address at which the ORB listens.
 
     Raises:
-        OrbFailed: it cannot listen at this address.
+        OrbFailed: the ORB cannot listen at this address.
     """
 
     def __init__(self, endpoint: Endpoint | None = None) -> None:
@@ -82,20 +85,21 @@ class Orb:
         """Make an object callable by peers.
 
         Args:
-            skeleton: class of its interface, of a `..__POA` module.
-            answers: objects with a method per operation, named as in the IDL; the first one that
-                has it is used, and a missing operation is NO_IMPLEMENT. They are called in threads
-                of the ORB. Exceptions become answers: TimeoutError is TIMEOUT, RtcRefused is
-                BAD_PARAM or similar, a CORBA exception is passed on, and any other is INTERNAL,
-                with a line in the log.
+            skeleton: skeleton class of the object's interface, from a `..__POA` module.
+            answers: objects with a method per operation, named as in the IDL. The first object that
+                has the method is used, and a missing operation is NO_IMPLEMENT. The methods are
+                called in threads of the ORB. Exceptions become answers: TimeoutError is TIMEOUT,
+                RtcRefused is BAD_PARAM or similar, a CORBA exception is passed on, and any other is
+                INTERNAL, with a line in the log.
 
         Returns:
-            Its reference; calls through it within this process use no socket.
+            The reference of the object. Calls through this reference within this process use no
+            socket.
         """
         return self._poa.id_to_reference(self._poa.activate_object(_servant(skeleton, answers)))
 
     def serve_as(self, name: str, skeleton: type, *answers: object) -> Reference:
-        """Let peers call an object that `corbaloc::HOST:PORT/NAME` names; see `serve`."""
+        """Let peers call an object under the name `corbaloc::HOST:PORT/NAME`; see `serve`."""
         poa = self._orb.resolve_initial_references("omniINSPOA")
         poa._get_the_POAManager().activate()
         self._named.append((poa, name.encode()))
@@ -103,7 +107,7 @@ class Orb:
         return poa.id_to_reference(name.encode())
 
     def key(self, reference: Reference) -> bytes:
-        """Return what tells an object that is served here from others; empty if it is not."""
+        """Return a key that identifies a served object, or an empty key for other objects."""
         try:
             found: bytes = self._poa.reference_to_id(reference)
         except (PortableServer.POA.WrongAdapter, CORBA.SystemException):
@@ -111,11 +115,11 @@ class Orb:
         return found
 
     def withdraw(self, reference: Reference) -> None:
-        """Let an object be called no more; calls that run end as they would."""
+        """Stop accepting calls of an object. Running calls end as usual."""
         self._poa.deactivate_object(self._poa.reference_to_id(reference))
 
     def reference(self, text: str) -> Reference:
-        """Return the reference for an IOR or a corbaloc; this sends no request.
+        """Return the reference for an IOR or a corbaloc. This sends no request.
 
         Raises:
             ValueError: the text is neither an IOR nor a corbaloc.
@@ -131,10 +135,10 @@ class Orb:
         return ior
 
     def close(self) -> None:
-        """Answer the running calls, refuse all others, and free the port.
+        """Answer the running calls, refuse all other calls, and free the port.
 
         If a peer closes the connection instead of answering, omniORB repeats the call, and such a
-        call may not end. Then the ORB is not closed, and a line is logged.
+        call may not end. In this case, the ORB is not closed, and a line is logged.
         """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)
@@ -150,7 +154,7 @@ class Orb:
 
 
 def _wait_while(is_busy: Callable[[], bool]) -> None:
-    """Wait for threads that are about to end: in the middle of a call the process could abort."""
+    """Wait for threads that are about to end, because the process could abort during a call."""
     end_s = time.monotonic() + _CLOSE_S
     while is_busy() and time.monotonic() < end_s:
         time.sleep(_POLL_S)
@@ -164,7 +168,7 @@ def _serves() -> bool:
 def nvlist(values: Mapping[str, str]) -> list[Any]:
     """Return an NVList of strings.
 
-    Characters that a CORBA string cannot carry become U+FFFD, and a line is logged. Otherwise the
+    Characters that a CORBA string cannot carry become U+FFFD, and a line is logged. Otherwise, the
     ORB would refuse the whole answer after the servant returned, where nothing can be logged.
     """
     name_value = stubs().sdo.NameValue
@@ -175,7 +179,7 @@ def nvlist(values: Mapping[str, str]) -> list[Any]:
 
 
 def carried(name: str, text: str) -> str:
-    """Return a text, for people called by a name, as a string of CORBA carries it."""
+    """Return a text in the form that a CORBA string can carry. The log names the text."""
     sent = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
     if sent != text:
         _LOG.warning(
@@ -185,7 +189,7 @@ def carried(name: str, text: str) -> str:
 
 
 def explain(error: Exception) -> str:
-    """Return in a few words why a call had no answer."""
+    """Return the reason in a few words why a call had no answer."""
     text = str(error)
     found = (words for mark, words in _REASONS.items() if mark in text.lower())
     return next(found, text or type(error).__name__)
@@ -211,7 +215,7 @@ def _servant(skeleton: type, answers: tuple[object, ...]) -> Any:
 
 
 def _answering(operation: Callable[..., Any]) -> Callable[..., Any]:
-    """Return an operation whatever of which ends in an answer."""
+    """Return an operation that always ends in an answer."""
 
     @wraps(operation)
     def answer(*args: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Connectors with components that run elsewhere, as a system file names them: made and kept."""
+"""Connectors to components that run elsewhere, as a system file names them. They are kept up."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _USUAL: Final = {
 
 
 class Peers:
-    """Maintains the connectors of a system with components that run elsewhere.
+    """Upkeep of the connectors of a system to components that run elsewhere.
 
     Each connector is checked once a second, in its own thread. A connector that cannot be made is
     tried again. A connector whose peer restarted is made again. A connector that was ended while
@@ -42,11 +42,11 @@ class Peers:
 
     Args:
         ports: ports of the system.
-        manager: manager of the system; its `remotes` list the wanted connectors.
+        manager: manager of the system. Its `remotes` list the wanted connectors.
         look_us: interval at which each connector is checked.
 
     Raises:
-        RtcRefused: a path names no port.
+        RtcRefused: a path does not name a port.
     """
 
     def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = _LOOK_US) -> None:
@@ -56,13 +56,13 @@ class Peers:
             thread.submit(partial(one.look, thread.retry_s))
 
     def close(self) -> None:
-        """Keep nothing any more; the connectors stay."""
+        """Stop the upkeep. The connectors stay."""
         for thread in self._threads:
             thread.close()
 
 
 class _Kept:
-    """A connector that is kept.
+    """A connector that is kept up.
 
     Attributes:
         name: name of the connector.
@@ -76,7 +76,7 @@ class _Kept:
         self._made, self._reason = False, ""
 
     def look(self, again_s: float) -> float | None:
-        """Make the connector if it is not there; None to look no more."""
+        """Make the connector if it is missing. Return None to stop checking it."""
         try:
             if self._made and self._peer is not None:
                 if not self._is_there():
@@ -93,7 +93,7 @@ class _Kept:
         return again_s
 
     def _is_there(self) -> bool:
-        """Return whether both sides have the connector; what it raises tells that one is gone."""
+        """Return whether both sides have the connector. An exception means that a side is gone."""
         wanted = self._wanted.connector_id
         theirs = self._peer.get_connector_profile(wanted).connector_id == wanted
         return bool(theirs) and self._ports.calls.call(self._is_here)
@@ -103,7 +103,7 @@ class _Kept:
         return port.find_connector(self._wanted.connector_id) is not None
 
     def _make(self) -> None:
-        """Find the peer's port, and connect it unless it is connected still."""
+        """Find the peer's port, and connect it unless it is still connected."""
         self._peer = peer = _port_of(self._find(), self._wanted.remote_port)
         if not self._is_there() and not self._connected(peer):
             self._peer, self._reason = None, self._reason or "refused"  # our port has logged why
@@ -113,7 +113,7 @@ class _Kept:
         self._made, self._reason = True, ""
 
     def _connected(self, peer: Reference) -> bool:
-        """Connect the ports, and return whether that was so."""
+        """Connect the ports. Return whether they are connected."""
         ours, values = self._ports.calls.call(self._begin)
         rtc, wanted = stubs().rtc, self._wanted
         profile = rtc.ConnectorProfile(
@@ -123,7 +123,10 @@ class _Kept:
         return bool(code == rtc.RTC_OK)
 
     def _begin(self) -> tuple[Reference, dict[str, str]]:
-        """Return our port's service, and what is to hold; what is left of a connector ends."""
+        """Return the local port's service, and the properties.
+
+        End remains of an earlier connector.
+        """
         port: AnyPort = self._manager.port(self._wanted.port)
         if (left := port.find_connector(self._wanted.connector_id)) is not None:
             left.end()
@@ -135,7 +138,7 @@ class _Kept:
         return ours, {**usual, **self._wanted.properties}
 
     def _find(self) -> Reference:
-        """Return the component, as its name server has it."""
+        """Return the component as registered in its name server."""
         orb: Orb = self._ports.orb
         where = orb.reference(f"corbaloc::{self._server}/NameService")
         root = where._narrow(CosNaming.NamingContext)
@@ -155,13 +158,13 @@ class _Kept:
 
 
 def refuse_wrong_paths(manager: Manager) -> None:
-    """Raise RtcRefused if a remote component has a path that leads nowhere."""
+    """Raise RtcRefused if a remote component has an invalid path."""
     for entry in manager.remotes.components:
         parse_path(entry.path)
 
 
 def parse_path(path: str) -> tuple[Endpoint, str]:
-    """Read a path as rtshell writes it: a name server, then a name in this server.
+    """Read a path in the notation of rtshell, with a name server, and a name in this server.
 
     >>> parse_path("localhost:2809/robot.host_cxt/Joystick0.rtc")
     (Endpoint(host='localhost', port=2809), 'robot.host_cxt/Joystick0.rtc')
@@ -179,7 +182,7 @@ def parse_path(path: str) -> tuple[Endpoint, str]:
 
 
 def _port_of(component: Reference, name: str) -> Reference:
-    """Return the port of a component, by its name without that of the component."""
+    """Return the port of a component by its name without the component's name."""
     known: list[str] = []
     for port in filter(None, component.get_ports()):
         profile: Any = port.get_port_profile()

@@ -1,4 +1,4 @@
-"""The ports of components as peers see them: each has a PortService."""
+"""The ports of components as peers see them. Each port has a PortService."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _CONNECTIONS_LOG: Final = log_of(__name__)
 
 
 class _PortSystem(Protocol):
-    """The ports of the same system, and its ORB.
+    """The ports of one system, and its ORB.
 
     Attributes:
-        threads: the threads that call peers, for all data ports.
+        threads: threads that call peers, for all data ports.
         arrivals: received values, until the next tick.
-        ending: connectors that have ended, by ID, until their peers are notified.
+        ending: connectors that have ended by ID, until their peers are notified.
     """
 
     orb: Orb
@@ -49,21 +49,21 @@ class _PortSystem(Protocol):
     ending: dict[str, _PeerConnection]
 
     def find(self, reference: Reference) -> AnyPort | None:
-        """Return the port of ours that a reference is of; None if it is a peer's."""
+        """Return the local port of a reference, or None if it belongs to a peer."""
         ...
 
     def connect(
         self, ports: tuple[AnyPort, AnyPort], profile: _Profile, values: dict[str, str]
     ) -> None:
-        """Join two ports of ours."""
+        """Connect two local ports."""
         ...
 
     def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return a connector of two ports of ours; None if peers know not both."""
+        """Return a connector of two local ports, or None unless peers know both ports."""
         ...
 
     def schedule(self, connector: ConnectorBase) -> None:
-        """Let a connector push from now on."""
+        """Make a connector push from now on."""
         ...
 
 
@@ -73,12 +73,12 @@ class _PeerConnection:
     Attributes:
         connector_id: ID of the connector.
         place: position of the local port in the list of ports.
-        peer: the peer's port.
-        peer_name: its name, for messages.
-        end: the local end.
-        additions: properties for the peer.
-        profile: as peers and tools see it; None until it is joined.
-        peer_knows: whether the peer knows that the connector ends, or need not know.
+        peer: port of the peer.
+        peer_name: name of the peer's port, for messages.
+        end: local end of the connector.
+        additions: properties that are added for the peer.
+        profile: profile as peers and tools see it, or None until the connector is joined.
+        peer_knows: whether the peer knows that the connector ends, or need not know it.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class _PeerConnection:
         self.peer_knows = False
 
     def notify_peer(self) -> None:
-        """Tell the peer that the connector has ended."""
+        """Notify the peer that the connector has ended."""
         try:
             self.peer.notify_disconnect(self.connector_id)
         except CORBA.Exception as error:
@@ -121,16 +121,16 @@ class _PeerConnections:
     def reserve(
         self, profile: _Profile, values: dict[str, str], peer_name: str
     ) -> _PeerConnection | None:
-        """Begin a connector: check it, and serve the object that the peer is to call.
+        """Check a new connector, and serve the object that the peer will call.
 
         Args:
             profile: profile of the connector.
-            values: its properties.
-            peer_name: name of the other port, for people.
+            values: properties of the connector.
+            peer_name: name of the other port, for display.
 
         Returns:
-            The connection that is still to be joined; None if both ports are local, because these
-            are joined at once.
+            The connection that must still be joined, or None if both ports are local, because local
+            ports are joined at once.
 
         Raises:
             RtcRefused: the connector cannot be made.
@@ -162,11 +162,11 @@ class _PeerConnections:
 
         Args:
             connection: the result of `reserve`.
-            profile: as returned by the peer.
-            values: its properties.
+            profile: profile that the peer returned.
+            values: properties of the connector.
 
         Raises:
-            RtcRefused: this is not possible, or the port no longer exists.
+            RtcRefused: the connector is impossible, or the port no longer exists.
         """
         if self._closed or self._by_id.get(connection.connector_id) is not connection:
             message = f"{self._port.full_name} has ended"
@@ -181,16 +181,16 @@ class _PeerConnections:
         self.end(connection.connector_id)
 
     def end(self, connector_id: str) -> None:
-        """End a connector, with a peer or not."""
+        """End a connector to a peer or to a local port."""
         if (connector := self._port.find_connector(connector_id)) is not None:
             connector.end()
         elif (connection := self._by_id.get(connector_id)) is not None:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connector with this ID, and whether it exists or has just ended.
+        """Return the connector with an ID, and whether it exists or has just ended.
 
-        After this call its peer need not be notified of the end.
+        After this call, the peer of the connector need not be notified of the end.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -198,18 +198,18 @@ class _PeerConnections:
         return connection, known or self._port.find_connector(connector_id) is not None
 
     def profiles(self) -> list[_Profile]:
-        """Return its connectors, but not those of probes."""
+        """Return the connectors of the port, without those of probes."""
         found = (self._describe(connector) for connector in self._port.connectors)
         return [profile for profile in found if profile is not None]
 
     def close(self) -> None:
-        """End all connectors with peers, and notify them; the port is gone."""
+        """End all connectors to peers, and notify the peers, because the port is gone."""
         self._closed = True
         for connection in tuple(self._by_id.values()):
             self.end(connection.connector_id)
 
     def _place(self, profile: _Profile) -> tuple[int, AnyPort | None]:
-        """Return the place of our port in a connector, and the other port if it is ours."""
+        """Return the position of the local port in a connector, and the other port if local."""
         if len(profile.ports) != 2 or None in profile.ports:
             raise RtcRefused(f"a connector joins two ports, not {len(profile.ports)}")
         found = [self._system.find(reference) for reference in profile.ports]
@@ -232,12 +232,12 @@ class _PeerConnections:
         return self._system.describe(connector) if connection is None else connection.profile
 
     def _ended(self, profile: ConnectorProfile) -> None:
-        """Process the end of a connector, from either side."""
+        """Process the end of a connector that either side requested."""
         if (connection := self._by_id.get(profile.connector_id)) is not None:
             self._end(connection)
 
     def _end(self, connection: _PeerConnection) -> None:
-        """Serve the peer no more, and tell it unless it knows."""
+        """Stop serving the peer, and notify it unless it knows the end."""
         self._by_id.pop(connection.connector_id, None)
         connection.end.close()
         if not connection.peer_knows:
@@ -247,7 +247,7 @@ class _PeerConnections:
             connection.end.thread.close()
 
     def _notify(self, connection: _PeerConnection) -> None:
-        """Tell a peer, in its thread."""
+        """Notify a peer in its thread."""
         connection.notify_peer()
         self._system.ending.pop(connection.connector_id, None)
 
@@ -270,16 +270,16 @@ _NAME_LENGTH: Final = 100
 
 
 class _PortAnswers:
-    """The operations of PortService, in threads of the ORB.
+    """The operations of PortService, executed in threads of the ORB.
 
-    The manager's thread does everything that concerns the port; peers are called here, without a
+    The manager's thread does everything that concerns the port. Peers are called here without a
     lock, because the call may come back.
 
     Args:
-        port: the local port.
-        connections: its connectors with peers.
-        calls: runs calls in the manager's thread.
-        describe: returns the PortProfile, in the manager's thread.
+        port: local port of the service.
+        connections: connectors of the port to peers.
+        calls: queue that runs calls in the manager's thread.
+        describe: function that returns the PortProfile, in the manager's thread.
     """
 
     def __init__(
@@ -298,22 +298,22 @@ class _PortAnswers:
         )
 
     def get_port_profile(self) -> Any:
-        """Return what the port is."""
+        """Return the profile of the port."""
         return self._calls.call(self._describe)
 
     def get_connector_profiles(self) -> list[_Profile]:
-        """Return its connectors."""
+        """Return the connectors of the port."""
         return self._calls.call(self._connections.profiles)
 
     def get_connector_profile(self, connector_id: str) -> _Profile:
-        """Return a connector; without one of this ID one that is empty."""
+        """Return the connector with an ID, or an empty one if there is none."""
         for profile in self.get_connector_profiles():
             if profile.connector_id == connector_id:
                 return profile
         return stubs().rtc.ConnectorProfile("", "", [], [])
 
     def connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Join the ports of a connector; an ID and the byte orders are filled in."""
+        """Connect the ports of a connector. A missing ID and missing byte orders are filled in."""
         profile.connector_id = profile.connector_id or str(uuid.uuid4())
         profile.properties = connector_ends.completed(profile.properties)
         if not profile.ports or profile.ports[0] is None:
@@ -327,7 +327,7 @@ class _PortAnswers:
         return answer
 
     def notify_connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Join our port with a connector, and have the port after it do the same."""
+        """Join the local port to a connector, and make the next port do the same."""
         code, values = _OK, connector_ends.texts(profile.properties)
         try:
             name = _peer_name(profile, self._port.full_name)
@@ -347,7 +347,7 @@ class _PortAnswers:
         return _code(code), profile
 
     def disconnect(self, connector_id: str) -> Any:
-        """End a connector: the first port that answers tells those after it."""
+        """End a connector. The first port that answers notifies the ports after it."""
         profile = self.get_connector_profile(connector_id)
         for port in profile.ports:
             with suppress(CORBA.SystemException):
@@ -360,7 +360,7 @@ class _PortAnswers:
         return next((code for code in codes if code != _code(_OK)), _code(_OK))
 
     def notify_disconnect(self, connector_id: str) -> Any:
-        """End a connector of our port, and have the port after it do the same."""
+        """End a connector of the local port, and make the next port do the same."""
         connection, known = self._calls.call(partial(self._connections.look, connector_id))
         if not known:
             return _code(ReturnCode.BAD_PARAMETER)
@@ -370,7 +370,7 @@ class _PortAnswers:
         return _code(_OK)
 
     def _join(self, connection: _PeerConnection, profile: _Profile) -> _Profile:
-        """Have the peer join, then join our end; if that fails nothing is left of either."""
+        """Make the peer join, then join the local end. If that fails, undo both."""
         asked = False
         try:
             profile.properties = connector_ends.changed(profile.properties, connection.additions)
@@ -390,7 +390,7 @@ class _PortAnswers:
         return profile
 
     def _log(self, text: str, reason: object) -> None:
-        """Log why the port is not connected, unless that was the reason the last time."""
+        """Log why the port is not connected, unless the last reason was the same."""
         line = f"{self._port.full_name} is not connected: {text % reason}"
         if line != self._last_line:
             _LOG.warning("%s", line)
@@ -398,7 +398,7 @@ class _PortAnswers:
 
 
 def _refuse(peer: str, code: Any) -> None:
-    """Raise RtcRefused with the code of a peer unless that is RTC_OK."""
+    """Raise RtcRefused with the return code of a peer, unless it is RTC_OK."""
     if (ours := ReturnCode.__members__.get(str(code), ReturnCode.RTC_ERROR)) is not _OK:
         raise RtcRefused(f"{peer} answers {ours.name}", ours)
 
@@ -412,7 +412,7 @@ def _peer_name(profile: _Profile, our_name: str) -> str:
     """Return the name of the peer's port.
 
     Tools name a connector after both ports, such as `A0.out_B0.in`. If the connector has no such
-    name, this function calls the peer for it, unless the peer is the present caller.
+    name, this function requests it from the peer, unless the peer is the present caller.
     """
     if rest := _line(profile.name.removeprefix(our_name).removesuffix(our_name).strip("_")):
         return rest
@@ -425,12 +425,12 @@ def _peer_name(profile: _Profile, our_name: str) -> str:
 
 
 def _line(text: str) -> str:
-    """Return a text of a peer as it may stand in a line of a log."""
+    """Return a text of a peer in a form that a log line can contain."""
     return " ".join(text.split())[:_NAME_LENGTH]
 
 
 _CLOSE_S: Final = 1.5
-"""Time limit to notify peers at the end: a call and its time-out."""
+"""Time limit to notify peers at the end, which is a call and its time-out."""
 
 _POLL_US: Final = 10_000
 
@@ -440,17 +440,17 @@ class SystemPorts:
 
     Args:
         orb: the ORB of this process.
-        calls: runs calls in the manager's thread.
+        calls: queue that runs calls in the manager's thread.
         manager: manager of the system.
 
     Attributes:
-        orb: as given.
-        calls: as given.
-        references: the PortService of each port.
-        ending: connectors that have ended, by ID, until their peers are notified.
-        components: the served components.
+        orb: ORB of this process.
+        calls: queue that runs calls in the manager's thread.
+        references: PortService of each port.
+        ending: connectors that have ended by ID, until their peers are notified.
+        components: components that are served.
         arrivals: values from peers, until the next tick.
-        threads: the threads that call peers, for all data ports.
+        threads: threads that call peers, for all data ports.
     """
 
     def __init__(self, orb: Orb, calls: CallQueue, manager: Manager) -> None:
@@ -463,7 +463,7 @@ class SystemPorts:
         self._by_key: dict[bytes, AnyPort] = {}
 
     def find(self, reference: Reference) -> AnyPort | None:
-        """Return the port of ours that a reference is of; None if it is a peer's."""
+        """Return the local port of a reference, or None if it belongs to a peer."""
         return self._by_key.get(self.orb.key(reference))
 
     def enter(self, port: AnyPort, reference: Reference) -> None:
@@ -480,7 +480,7 @@ class SystemPorts:
     def connect(
         self, ports: tuple[AnyPort, AnyPort], profile: _Profile, values: dict[str, str]
     ) -> None:
-        """Join two ports of ours."""
+        """Connect two local ports."""
         if isinstance(ports[0], DataPort):
             values = {
                 **values,
@@ -492,7 +492,7 @@ class SystemPorts:
         self._manager.connect(ports[0].full_name, ports[1].full_name, values, **names)
 
     def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return a connector of two ports of ours; None if peers know not both."""
+        """Return a connector of two local ports, or None unless peers know both ports."""
         references = [self.references.get(port) for port in connector.ports]
         if len(references) != 2 or None in references:
             return None
@@ -503,7 +503,7 @@ class SystemPorts:
         )
 
     def close(self) -> None:
-        """End all connectors with peers; peers that do not answer are not notified."""
+        """End all connectors to peers. Peers that do not answer are not notified."""
         for component in tuple(self.components):
             component.close()
         self._manager.remove_item(self.arrivals)
@@ -513,18 +513,18 @@ class SystemPorts:
         self.threads.close()
 
     def schedule(self, connector: ConnectorBase) -> None:
-        """Let a connector push from now on."""
+        """Make a connector push from now on."""
         if isinstance(connector, Connector):
             self._manager.add_connector(connector)
 
 
 class ComponentPorts:
-    """The ports of a component, served as long as it lives.
+    """The ports of a component, which are served while the component lives.
 
     Args:
         system: all ports of the system.
         component: the local component.
-        owner: its RTObject.
+        owner: RTObject of the component.
     """
 
     def __init__(self, system: SystemPorts, component: RtComponent, owner: Reference) -> None:
@@ -537,7 +537,7 @@ class ComponentPorts:
         return self._system.calls.call(self._services)
 
     def close(self) -> None:
-        """End all connectors with peers, notify them, and stop serving."""
+        """End all connectors to peers, notify the peers, and stop serving."""
         self._system.calls.call(self._end)
 
     def _begin(self) -> None:
@@ -554,7 +554,7 @@ class ComponentPorts:
         return [self._system.references[port] for port in self._component.ports.values()]
 
     def _update(self) -> None:
-        """Serve the ports that are there by now, and none else."""
+        """Serve all ports that exist now, and no others."""
         ports = tuple(self._component.ports.values())
         self._withdraw(tuple(port for port in self._connections if port not in ports))
         for port in ports:

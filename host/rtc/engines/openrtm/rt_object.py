@@ -17,28 +17,28 @@ class _Ports(Protocol):
     """The ports of a component as an ORB serves them."""
 
     def services(self) -> list[Reference]:
-        """Return a PortService for each."""
+        """Return a PortService for each port."""
         ...
 
     def close(self) -> None:
-        """Stop accepting calls for them."""
+        """Stop accepting calls for the ports."""
         ...
 
 
 class RtObjectServant:
-    """The servant of a component; its methods are the operations of the IDL.
+    """The servant of a component. Its methods are the operations of the IDL.
 
-    Not emulated: organizations and composite components (lists of them are empty), and services
-    that peers add.
+    Not emulated: organizations and composite components, whose lists are empty, and services that
+    peers add.
 
     Args:
-        component: the component.
-        manager: its manager.
+        component: component to serve.
+        manager: manager of the component.
         references: references of components.
 
     Attributes:
-        ports: its ports, once they are served.
-        configuration: reference of its configuration.
+        ports: ports of the component, once they are served.
+        configuration: reference of the component's configuration.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class RtObjectServant:
         self.configuration: Reference = None
 
     def get_component_profile(self) -> Any:
-        """Return what there is to know."""
+        """Return the profile of the component."""
         spec, name = self._component.spec, self._component.instance_name
         profiles = [port.get_port_profile() for port in self.get_ports()]
         return self._stubs.rtc.ComponentProfile(
@@ -66,15 +66,15 @@ class RtObjectServant:
         )
 
     def get_ports(self) -> list[Reference]:
-        """Return its ports."""
+        """Return the ports of the component."""
         return [] if self.ports is None else self.ports.services()
 
     def initialize(self) -> Any:
-        """Refuse: it was initialized when its manager got it."""
+        """Refuse the request, because the manager has already initialized the component."""
         return self._code(self._component.initialize)
 
     def finalize(self) -> Any:
-        """Refuse: a component of a manager takes part in some context; `exit` ends it."""
+        """Refuse the request, because the component takes part in a context. `exit` ends it."""
         return self._code(self._component.finalize)
 
     def exit(self) -> Any:
@@ -84,38 +84,38 @@ class RtObjectServant:
     on_initialize, on_finalize = initialize, finalize
 
     def get_sdo_id(self) -> str:
-        """Return its instance name."""
+        """Return the instance name of the component."""
         return self._component.instance_name
 
     def get_sdo_type(self) -> str:
-        """Return its description."""
+        """Return the description of the component."""
         return self._component.spec.description
 
     def get_device_profile(self) -> Any:
-        """Return who made what."""
+        """Return the vendor, model and version of the component."""
         spec = self._component.spec
         return self._stubs.sdo.DeviceProfile(
             spec.category, spec.vendor, spec.type_name, spec.version, []
         )
 
     def get_configuration(self) -> Reference:
-        """Return its configuration."""
+        """Return the configuration of the component."""
         return self.configuration
 
     def get_organizations(self) -> list[Any]:
-        """Return none, as those that follow."""
+        """Return an empty list, as the following operations do."""
         return []
 
     get_owned_organizations = get_service_profiles = get_status_list = get_organizations
 
     def get_service_profile(self, name: str) -> Any:
-        """Refuse, as those that follow: it has none."""
+        """Refuse the request, as the following operations do, because there are no services."""
         raise self._stubs.sdo.InvalidParameter(f"it has no {name!r}")
 
     get_sdo_service = get_status = get_service_profile
 
     def get_monitoring(self) -> Any:
-        """Refuse: there is none."""
+        """Refuse the request, because there is no monitoring."""
         raise self._stubs.sdo.InterfaceNotImplemented("no Monitoring")
 
     def _exit(self) -> ReturnCode:
@@ -129,7 +129,7 @@ class RtObjectServant:
 
 
 def _properties_of(component: RtComponent) -> dict[str, str]:
-    """Return what OpenRTM has in the properties of a component's profile."""
+    """Return the properties that OpenRTM has in the profile of a component."""
     spec = component.spec
     return {
         "implementation_id": spec.type_name,

@@ -1,4 +1,4 @@
-"""Stubs of our IDL: compiled by omniidl when they are first wanted, and kept in a cache."""
+"""Stubs of Tickrig's IDL, which omniidl compiles at their first use, and which are cached."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from typing import Any, Final
 from tickrig.host.rtc.states import RtcRefused
 
 _PACKAGE: Final = "tickrig_openrtm"
-"""What the stubs are imported as: others may have some of the same IDL modules."""
+"""Package name of the stubs, because other packages may have some of the same IDL modules."""
 
 IDL: Final = Path(__file__).parent / "idl"
 DATA_TYPES: Final = "DataTypes.idl"
-"""For peers; here the bytes of values are made without an ORB."""
+"""IDL module for peers. In this process, values become bytes without an ORB."""
 
 _NEEDS_OMNIORB: Final = "OpenRTM needs omniORB: pip install 'tickrig[openrtm]'"
 
@@ -35,17 +35,17 @@ _MODULES: Final = ("SDOPackage", "RTC", "OpenRTM", "RTM", "_GlobalIDL")
 class Stubs:
     """The modules of Tickrig's IDL in omniORB's Python mapping.
 
-    Their names are known only at run time, so their type is `Any`.
+    The names in these modules are known only at run time, so their type is `Any`.
 
     Args:
-        modules: the modules by name, including those of skeletons (`RTC__POA`).
+        modules: modules by name, including modules of skeletons (`RTC__POA`).
 
     Attributes:
-        sdo: `SDOPackage`.
-        rtc: `RTC`.
-        openrtm: `OpenRTM`, of the component and of data ports.
-        rtm: `RTM`, of the manager.
-        services: definitions outside of IDL modules: `RefHard`.
+        sdo: IDL module `SDOPackage`.
+        rtc: IDL module `RTC`.
+        openrtm: IDL module `OpenRTM`, with the component and data ports.
+        rtm: IDL module `RTM`, with the manager.
+        services: definitions outside of IDL modules, which is `RefHard`.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:
@@ -58,7 +58,8 @@ class Stubs:
         """Return the skeleton class of an interface, for `Orb.serve`.
 
         Args:
-            interface: such as `RTC.PortService`, or `RefHard`, which is in no module.
+            interface: name of the interface, such as `RTC.PortService`, or `RefHard`, which is in
+                no module.
         """
         module, _, name = interface.rpartition(".")
         found: type = getattr(self._modules[f"{module or '_GlobalIDL'}__POA"], name)
@@ -67,7 +68,7 @@ class Stubs:
 
 @cache
 def stubs() -> Stubs:
-    """Import the stubs; the first time on a machine they are compiled, which takes 0.5 s.
+    """Import the stubs. The first time on a machine they are compiled, which takes 0.5 s.
 
     Raises:
         RtcRefused: omniORB is not installed, or the stubs cannot be made.
@@ -90,7 +91,7 @@ def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) ->
     """Write stubs into a folder.
 
     Args:
-        files: IDL files; the files that they include are in the folder of Tickrig's IDL.
+        files: IDL files. The files that they include are in the folder of Tickrig's IDL.
         folder: folder for the package.
         package: package that contains the modules.
 
@@ -111,7 +112,7 @@ def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) ->
 
 
 def _preprocessor() -> list[str]:
-    """Return where omniidl finds its preprocessor: the wheel has it in a folder of its own."""
+    """Return the path of omniidl's preprocessor. The wheel has it in a folder of its own."""
     found = importlib.util.find_spec("jeteve_omniorb")
     for folder in (found and found.submodule_search_locations) or ():
         return [f"-Y{Path(folder) / 'bin' / 'omnicpp'}"]
@@ -119,13 +120,13 @@ def _preprocessor() -> list[str]:
 
 
 def _cache_folder() -> Path:
-    """Return where the stubs of this user are kept; below a file if there is no such place."""
+    """Return the folder for this user's stubs. It is below a file if there is no such place."""
     named = os.environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache"), os.devnull
     return next(Path(folder) for folder in named if Path(folder).is_absolute()) / "tickrig"
 
 
 def _key(files: list[Path], version: str) -> str:
-    """Return what the stubs depend on, in 16 digits."""
+    """Return a hash of 16 digits over everything that the stubs depend on."""
     digest = hashlib.sha256(f"{version} {sys.version_info[:2]} {_PACKAGE}".encode())
     for path in files:
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
@@ -133,10 +134,10 @@ def _key(files: list[Path], version: str) -> str:
 
 
 def _compiled(files: list[Path], cached: Path) -> Path:
-    """Return the folder with new stubs: the cached one, or another if that cannot be written.
+    """Return the folder with new stubs, either the cached folder, or another if it is not writable.
 
-    The stubs are written into a temporary folder, which is then renamed. So two processes can do
-    this at the same time: both use the folder of the faster one.
+    The stubs are written into a temporary folder, which is then renamed. Therefore two processes
+    can do this at the same time. Both processes use the folder of the faster one.
     """
     try:
         cached.parent.mkdir(parents=True, exist_ok=True)
@@ -154,7 +155,7 @@ def _compiled(files: list[Path], cached: Path) -> Path:
 
 
 def _temporary(files: list[Path]) -> Path:
-    """Compile into a folder that ends with this process."""
+    """Compile the stubs into a folder that ends with this process."""
     try:
         made = Path(tempfile.mkdtemp(prefix="tickrig-openrtm-"))
         atexit.register(shutil.rmtree, made, ignore_errors=True)
@@ -165,7 +166,7 @@ def _temporary(files: list[Path]) -> Path:
 
 
 def _imported(folder: Path) -> Stubs:
-    """Import the stubs from a folder; nothing is put on the path of modules."""
+    """Import the stubs from a folder without adding it to the path of modules."""
     for name in [name for name in sys.modules if name.partition(".")[0] == _PACKAGE]:
         del sys.modules[name]
     home = folder / _PACKAGE

@@ -1,4 +1,4 @@
-"""Which values of ports are which messages of ROS 2, and what makes one of the other."""
+"""The messages of ROS 2 for values of ports, and conversions in both directions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tickrig.wire.rtc_types.rtc import ActArrayState, RangeData
 
 _Conversion = Callable[[Any], Any]
 _Maker = Callable[[TopicEntry, Stamps], _Conversion]
-"""Makes what converts the values, or the messages, of one port."""
+"""Function that makes a converter for the values, or the messages, of one port."""
 
 _STD: Final[Mapping[str, tuple[type[Struct], ...]]] = {
     "Bool": (rtc.TimedBoolean,),
@@ -40,7 +40,7 @@ _ANGLES: Final = (rtc.TimedDoubleSeq, rtc.TimedFloatSeq, rtc.TimedDouble, rtc.Ti
 
 
 def _data_out(name: str) -> _Maker:
-    """Return what makes a message of `data` alone."""
+    """Return a function that makes a message with only the field `data`."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> _Conversion:
         kind = message_type(name)
@@ -50,7 +50,7 @@ def _data_out(name: str) -> _Maker:
 
 
 def _array_out(name: str) -> _Maker:
-    """Return what makes a message with a layout, which stays empty."""
+    """Return a function that makes a message with a layout, which stays empty."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> _Conversion:
         kind, layout = message_type(name), message_type("std_msgs/msg/MultiArrayLayout")([], 0)
@@ -60,7 +60,7 @@ def _array_out(name: str) -> _Maker:
 
 
 def _data_in(data_type: type[Struct]) -> _Maker:
-    """Return what makes a value of the `data` of a message."""
+    """Return a function that makes a value from the field `data` of a message."""
     make: Any = data_type
     return lambda entry, stamps: lambda message: make(stamps.to_system(), message.data)
 
@@ -95,7 +95,7 @@ OUT: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     ("sensor_msgs/msg/LaserScan", RangeData): robot.scan_out,
     **_STD_OUT,
 }
-"""Of an OutPort; the first message that fits a type is the usual one."""
+"""Conversions for an OutPort. The first message that fits a type is the default."""
 
 IN: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     **{("geometry_msgs/msg/Twist", kind): robot.twist_in(kind) for kind in _SPEEDS},
@@ -103,7 +103,7 @@ IN: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_in(kind) for kind in _POSES},
     **_STD_IN,
 }
-"""Of an InPort."""
+"""Conversions for an InPort."""
 
 MESSAGES: Final = tuple(sorted({name for name, _ in (*OUT, *IN)}))
 """Messages that a table can name."""

@@ -1,4 +1,4 @@
-"""Joins the ports of a system with topics of ROS 2, as a table says."""
+"""An engine that joins the ports of a system with topics of ROS 2, according to a table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ from tickrig.wire.rtc_types.rtc import Time
 
 
 def _usual_entries(component: RtComponent) -> tuple[TopicEntry, ...]:
-    """Return an entry for each port, with the first message that fits: `ConsoleIn0/out`."""
+    """Return an entry for each port, with the first message that fits.
+
+    A topic is `ConsoleIn0/out`.
+    """
     found = []
     for port in component.ports.values():
         if isinstance(port, InPort | OutPort):
@@ -42,7 +45,7 @@ def _usual_entries(component: RtComponent) -> tuple[TopicEntry, ...]:
 
 
 def _token(name: str) -> str:
-    """Return a name as ROS 2 can have it in a topic."""
+    """Return a name in the form that ROS 2 allows in a topic."""
     token = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     return token if token[:1].isalpha() else f"p{token}"
 
@@ -53,17 +56,17 @@ _TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
 
 _WARN: Final = 1
 _LEVELS: Final = {LifeCycleState.ACTIVE: 0, LifeCycleState.ERROR: 2}
-"""OK and ERROR of DiagnosticStatus; a component neither Active nor in Error is WARN."""
+"""Levels of DiagnosticStatus. A component that is neither Active nor in Error is WARN."""
 
 
 class _Diagnostics:
-    """Publishes the states of all components each period; the manager ticks it.
+    """A publisher of the states of all components in each period. The manager ticks it.
 
     Args:
-        manager: has the components.
-        stamps: converts times of the system to times of the machine.
+        manager: manager with the components.
+        stamps: converter from times of the system to times of the machine.
         period_us: interval of the messages.
-        send: called with each message.
+        send: function that is called with each message.
     """
 
     def __init__(
@@ -77,7 +80,7 @@ class _Diagnostics:
         self._time = message_type("builtin_interfaces/msg/Time")
 
     def tick(self, now_us: int) -> None:
-        """Tell them, if it is time to."""
+        """Publish the states if that is due."""
         if now_us < self.due_us:
             return
         self.due_us += self._period_us * (1 + (now_us - self.due_us) // self._period_us)
@@ -126,11 +129,11 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
 
 
 def _read_table(options: Ros2Options) -> TopicTable:
-    """Return the given table, else the table of the command, else a table of all ports.
+    """Return the given table, or the table of the command, or a table of all ports.
 
     Raises:
         OSError: the table cannot be read.
-        ValueError: the table is invalid; the message has a line for each mistake.
+        ValueError: the table is invalid. The message has a line for each mistake.
     """
     if options.table is not None:
         return parse_table(options.table.read_text("utf-8"), str(options.table))
@@ -138,7 +141,7 @@ def _read_table(options: Ros2Options) -> TopicTable:
 
 
 def _refuse_mistakes(table: TopicTable, manager: Manager) -> None:
-    """Raise ValueError with all that does not fit the components that are there, a line each."""
+    """Raise ValueError with a line for each entry that does not fit the present components."""
     components = {each.instance_name: each for each in manager.components}
     mistakes = []
     for entry in table.entries or ():
@@ -167,13 +170,13 @@ def _mistakes_of(entry: TopicEntry, component: RtComponent) -> list[str]:
 
 
 class _Ros2Engine:
-    """Reads and writes topics in threads of its own, and joins them with ports.
+    """An engine that reads and writes topics in its own threads, and joins them with ports.
 
     Args:
-        options: domain and interface.
-        table: the ports and their topics.
+        options: domain and interface of the engine.
+        table: table with the ports and their topics.
         manager: manager of the system.
-        calls: runs calls in the manager's thread.
+        calls: queue that runs calls in the manager's thread.
 
     Raises:
         ValueError: the domain or the interface is invalid.
@@ -199,7 +202,7 @@ class _Ros2Engine:
         self._in.submit(self._foreign.look)
 
     def join(self, component: RtComponent) -> None:
-        """Join the ports of a component; log failures in one line."""
+        """Join the ports of a component. Log failures in one line."""
         name = component.instance_name
         entries = self._table.entries
         if entries is None:
@@ -300,7 +303,7 @@ def _no_value(value: Any) -> Any:
 
 
 def _logging(entry: TopicEntry, encode: Any) -> Any:
-    """Return an encoder that says in a line which value cannot be a message, the first time."""
+    """Return an encoder that logs the first value that cannot be a message, in one line."""
     warned = False
 
     def encoded(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Messages of ROS 2 as types of Cyclone DDS; each type is made of its fields at its first use.
+"""Messages of ROS 2 as types of Cyclone DDS. Each type is made from its fields at its first use.
 
 >>> list(message_type("geometry_msgs/msg/Twist").__dataclass_fields__)
 ['linear', 'angular']
@@ -18,22 +18,22 @@ from tickrig.wire.rtc_types.rtc import Time
 # Times of values and of messages: one counts from the start of a system, the other from 1970.
 
 _FAR_US: Final = 1_000_000
-"""A value that is farther from the present counts its time on another clock, or not at all."""
+"""Distance from the present above which a value's time is of another clock, or not a time."""
 
 _ASTRAY_NS: Final = 10_000_000_000
-"""If a system is this late, or a clock was set, the offset between the times is updated."""
+"""Delay of a system, or change of a clock, after which the offset between times is updated."""
 
 
 class Stamps:
-    """Converts between the time of a system and that of the machine.
+    """A converter between the time of a system and the time of the machine.
 
     Values with equal times get equal stamps, for example a pose and its transform. A value whose
-    time differs by more than 1 s from that of the system gets the current time. Values that a late
-    system writes have the time at which they were due.
+    time differs by more than 1 s from the time of the system gets the current time. Values that a
+    late system writes have the time at which they were due.
 
     Args:
-        now_us: returns the time of the system.
-        clock: nanoseconds since 1970.
+        now_us: function that returns the time of the system.
+        clock: function that returns nanoseconds since 1970.
     """
 
     def __init__(self, now_us: Callable[[], int], clock: Callable[[], int] = time.time_ns) -> None:
@@ -54,7 +54,7 @@ class Stamps:
         return divmod(self._start_ns + 1_000 * tm_us, 1_000_000_000)
 
     def to_system(self, sec: int = 0, nanosec: int = 0) -> Time:
-        """Return the time of a message that has this stamp, the present without one."""
+        """Return the time of a message with this stamp, or the present time without a stamp."""
         now_us = self._now_us()
         at_us = (sec * 1_000_000_000 + nanosec - self._start_ns) // 1_000
         if not -_FAR_US <= at_us - now_us <= _FAR_US:
@@ -68,7 +68,7 @@ def _read_fields(text: str) -> dict[str, str]:
 
 
 _FIELDS: Final = _read_fields(Path(__file__).with_name("messages.txt").read_text("utf-8"))
-"""Fields by message."""
+"""Fields of messages by the name of the message."""
 
 _PYTHON: Final[dict[str, Any]] = {"bool": bool, "string": str}
 _FIELD: Final = re.compile(r"([\w/]+)(?:(\[)(\d*)\])? (\w+)")
@@ -79,7 +79,7 @@ def message_type(name: str) -> Any:
     """Return the class of a message, with its fields in the order of the message definition.
 
     Args:
-        name: such as `geometry_msgs/msg/Twist`.
+        name: name of the message, such as `geometry_msgs/msg/Twist`.
 
     Raises:
         KeyError: the message is unknown.
@@ -101,7 +101,7 @@ def dds_name(name: str) -> str:
 
 
 def ros_name(name: str) -> str:
-    """Return the ROS name for the DDS name of a message; other names are returned unchanged.
+    """Return the ROS name for the DDS name of a message. Other names are returned unchanged.
 
     >>> ros_name("std_msgs::msg::dds_::Bool_"), ros_name("HelloWorld")
     ('std_msgs/msg/Bool', 'HelloWorld')

@@ -1,4 +1,4 @@
-"""Our participant in a domain of DDS: what it writes and reads, and what it hears of others."""
+"""The local participant in a domain of DDS, with its writers and readers, and its view of peers."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from tickrig.host.text.log import log_of
 # What Cyclone DDS has to say: it would write a line to standard error for each message.
 
 _FATAL: Final = 1
-"""Of the categories of its log (dds/ddsrt/log.h): what it writes to standard error."""
+"""Log category for messages on standard error (dds/ddsrt/log.h)."""
 
 _MOST_MESSAGES: Final = 100
-"""Kinds of messages that are logged; further ones are not."""
+"""Number of kinds of messages that are logged. Further kinds are not logged."""
 
 _DESCRIPTORS: Final = "/dev/fd"
 _DDS_LOG: Final = log_of(__name__)
@@ -44,13 +44,16 @@ _HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
 
 
 class _DdsLog:
-    """Reads log lines of DDS from a pipe until it is closed, and logs each kind of line once.
+    """A log that reads lines of DDS from a pipe until it is closed.
 
-    Lines of a kind differ only in numbers. Writers do not wait: lines that do not fit into the pipe
+    Each kind of line is logged once.
+
+    Lines of a kind differ only in numbers. Writers do not wait. Lines that do not fit into the pipe
     are lost.
 
     Attributes:
-        configuration: makes DDS write into the pipe; empty on systems where pipes have no names.
+        configuration: configuration that makes DDS write into the pipe. It is empty on systems
+            where pipes have no names.
     """
 
     def __init__(self) -> None:
@@ -68,7 +71,7 @@ class _DdsLog:
         self._thread.start()
 
     def close(self) -> None:
-        """End, once DDS has left the pipe."""
+        """End the log after DDS has closed the pipe."""
         os.close(self._writer)
 
 
@@ -85,7 +88,7 @@ def _read(descriptor: int) -> None:
 
 _LOOPBACK: Final = "127.0.0.1"
 _MOST_PARTICIPANTS: Final = 32
-"""Multicast does not work on loopback: this many participants are searched, as in ROS 2."""
+"""Number of participants that are searched, as in ROS 2, because loopback has no multicast."""
 
 HISTORY: Final = 10
 
@@ -96,7 +99,10 @@ _CONFIGURATION: Final = """\
 <Discovery>{discovery}</Discovery>
 {log}
 </Domain></CycloneDDS>"""
-"""1.15 is Fast DDS: its type information of what has arrays does not match that of Cyclone."""
+"""Configuration of DDS. 1.15 is Fast DDS.
+
+Type information of Fast DDS on types with arrays does not match that of Cyclone.
+"""
 
 _PEERS: Final = (
     "<ParticipantIndex>auto</ParticipantIndex>"
@@ -106,11 +112,11 @@ _PEERS: Final = (
 
 
 class DdsParticipant:
-    """Takes part in a domain until it is closed.
+    """A participant in a DDS domain until it is closed.
 
     Args:
-        domain: 0..232.
-        interface: network interface of the machine, such as eth0; loopback if empty.
+        domain: number of the domain, 0..232.
+        interface: network interface of the machine, such as eth0, or loopback if it is empty.
 
     Raises:
         ValueError: the interface does not exist, or cannot be used.
@@ -132,16 +138,16 @@ class DdsParticipant:
             raise ValueError(f"{where} cannot be joined: {reason_of(error)}") from None
 
     def writer(self, entry: TopicEntry) -> Any:
-        """Return a new DataWriter of a topic; DDSException if there can be none."""
+        """Return a new DataWriter of a topic. Raise DDSException if that is impossible."""
         return DataWriter(self.entity, self._topic(entry), qos=_qos_of(entry))
 
     def reader(self, entry: TopicEntry, listener: Listener) -> Any:
-        """Return a new DataReader of a topic; DDSException if there can be none."""
+        """Return a new DataReader of a topic. Raise DDSException if that is impossible."""
         topic = self._topic(entry)
         return DataReader(self.entity, topic, qos=_qos_of(entry), listener=listener)
 
     def close(self) -> None:
-        """Leave the domain; peers learn of it at once."""
+        """Leave the domain. Peers are notified at once."""
         self._topics.clear()
         self.entity = self._domain = None
         self._log.close()
@@ -154,12 +160,15 @@ class DdsParticipant:
 
 
 def dds_topic(name: str) -> str:
-    """Return how DDS calls a topic of ROS 2."""
+    """Return the DDS name of a ROS 2 topic."""
     return f"rt/{name}"
 
 
 def _qos_of(entry: TopicEntry) -> Qos:
-    """Return the found readers and writers; a peer that does not accept data delays no other."""
+    """Return the QoS of readers and writers.
+
+    A peer that does not accept data delays no other peer.
+    """
     reliability = (
         Policy.Reliability.Reliable(0) if entry.reliable else Policy.Reliability.BestEffort
     )
@@ -172,12 +181,12 @@ def _qos_of(entry: TopicEntry) -> Qos:
 
 
 def reason_of(error: DDSException) -> str:
-    """Return what DDS says, without the names of its code."""
+    """Return the reason of a DDS error without the names in its code."""
     return str(error).partition("]")[2].strip() or str(error)
 
 
 def _place(interface: str) -> tuple[str, str]:
-    """Return the interface and what is to be known of peers, as the configuration has them."""
+    """Return the settings of the interface and of peers in the configuration."""
     if not interface:
         return f'address="{_LOOPBACK}" multicast="false"', _PEERS
     known = [name for _, name in socket.if_nameindex()]
@@ -190,14 +199,14 @@ def _place(interface: str) -> tuple[str, str]:
 
 _LOOK_S: Final = 0.5
 MATCH_S: Final = 5.0
-"""So long a peer that seems to fit may take until it is matched."""
+"""Longest time until a peer that seems to fit is matched."""
 
 _MOST: Final = 1_000
 
 _INFINITE_NS: Final = 0x7FFF_FFFF_FFFF_FFFF
 
 _UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
-"""Handles are 64 bits, which Cyclone DDS's Python has with a sign or without."""
+"""Mask for handles of 64 bits, which Cyclone DDS's Python returns with or without a sign."""
 
 _LOG: Final = log_of(__name__)
 
@@ -206,30 +215,30 @@ class OwnEndpoint(Protocol):
     """A writer or reader of a local topic.
 
     Attributes:
-        entry: port and topic.
+        entry: port and topic of the endpoint.
     """
 
     @property
     def entry(self) -> TopicEntry:
-        """Port and topic."""
+        """Port and topic of the endpoint."""
         ...
 
     def matched(self) -> list[int]:
-        """Return the instance handles of the peers that it is joined with."""
+        """Return the instance handles of the matched peers."""
         ...
 
 
 _Endpoints = Mapping[str, OwnEndpoint]
-"""By topic, as DDS calls it."""
+"""Endpoints by the DDS name of their topic."""
 
 
 class ForeignEndpoints:
-    """Logs a line with the reason for each peer that cannot be joined with a local topic.
+    """A log of peers that cannot be joined with a local topic. Each gets a line with the reason.
 
     Args:
-        participant: takes part in the domain.
-        writing: the topics written here; they may change.
-        reading: the topics read here.
+        participant: participant in the domain.
+        writing: topics that are written here, which may change.
+        reading: topics that are read here.
     """
 
     def __init__(
@@ -243,7 +252,7 @@ class ForeignEndpoints:
         self._awaited: dict[int, tuple[float, OwnEndpoint, str]] = {}
 
     def look(self) -> float | None:
-        """Log news; return when to call again, in s."""
+        """Log new peers. Return the time until the next call, in s."""
         for reader, ours, reads in self._sides:
             try:
                 endpoints = reader.take(_MOST)
@@ -259,7 +268,7 @@ class ForeignEndpoints:
         return _LOOK_S
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._sides = ()
         self._awaited.clear()
 
@@ -282,7 +291,7 @@ class ForeignEndpoints:
             self._awaited[handle] = time.monotonic() + MATCH_S, own, text
 
     def _look_for_unmatched(self) -> None:
-        """Log peers with a matching name that were not joined in all that time."""
+        """Log peers with a matching name that were not joined within the time limit."""
         for handle, (until_s, own, text) in tuple(self._awaited.items()):
             if time.monotonic() > until_s:
                 del self._awaited[handle]
@@ -296,7 +305,7 @@ class ForeignEndpoints:
 
 
 def _refused_policy(qos: Any, *, reads: bool) -> str:  # noqa: PLR0911 - a table
-    """Return the first incompatible policy of a peer, with its value; empty if all are compatible.
+    """Return a peer's first incompatible policy with its value, empty if all are compatible.
 
     The local policies are the defaults of DDS: no deadline, automatic liveliness without a lease,
     shared ownership, order by reception (DDS 1.4, 2.2.3: requested and offered must be compatible).

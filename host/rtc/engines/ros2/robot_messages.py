@@ -1,4 +1,4 @@
-"""Poses, velocities, joints and ranges as messages of ROS 2, and back.
+"""Conversion of poses, velocities, joints and ranges to messages of ROS 2, and back.
 
 Lengths are in m and angles in rad. Frames follow REP 103: x ahead, y to the left, z up. A pose in
 the plane has z = 0, and a heading is a rotation about z. Covariances stay 0, which means unknown.
@@ -18,11 +18,14 @@ _UNKNOWN: Final = [0.0] * 36
 """An unknown covariance."""
 
 _STRAIGHT: Final = 1e-9
-"""A turn below this counts as none, rad."""
+"""Angle below which a turn counts as none, in rad."""
 
 
 def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes an Odometry of poses; the velocity is that since the pose before."""
+    """Return a function that makes an Odometry of poses.
+
+    The velocity is that since the previous pose.
+    """
     make, speed = _odometry(entry, stamps), _Speed()
 
     def convert(value: Any) -> Any:
@@ -33,7 +36,7 @@ def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes an Odometry of poses with their velocities."""
+    """Return a function that makes an Odometry of poses with their velocities."""
     make = _odometry(entry, stamps)
 
     def convert(value: Any) -> Any:
@@ -44,7 +47,7 @@ def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a TFMessage with one transform of poses."""
+    """Return a function that makes a TFMessage with one transform of a pose."""
     header, vector, turned = _header(entry, stamps), _vector(), _turned()
     stamped = message_type("geometry_msgs/msg/TransformStamped")
     transform, message = message_type("geometry_msgs/msg/Transform"), message_type(entry.type)
@@ -58,13 +61,13 @@ def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a PoseStamped of poses."""
+    """Return a function that makes a PoseStamped of a pose."""
     header, pose, message = _header(entry, stamps), _pose(), message_type(entry.type)
     return lambda value: message(header(value.tm), pose(value.data))
 
 
 def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return what makes poses of PoseStamped; whatever tilts them is left out."""
+    """Return a function that makes a pose of a PoseStamped. A tilt is left out."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
         def convert(message: Any) -> Any:
@@ -80,13 +83,13 @@ def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], An
 
 
 def twist_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a Twist of velocities in the plane."""
+    """Return a function that makes a Twist of a velocity in the plane."""
     twist = _twist()
     return lambda value: twist(value.data.vx, value.data.vy, value.data.va)
 
 
 def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a TwistStamped of velocities in the plane."""
+    """Return a function that makes a TwistStamped of a velocity in the plane."""
     header, twist, message = _header(entry, stamps), _twist(), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -97,7 +100,7 @@ def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]
 
 
 def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return what makes velocities in the plane of Twist or TwistStamped."""
+    """Return a function that makes a velocity in the plane of a Twist or TwistStamped."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
         stamped = entry.type.endswith("Stamped")
@@ -113,7 +116,7 @@ def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], A
 
 
 def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a JointState of positions."""
+    """Return a function that makes a JointState of positions."""
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -125,7 +128,7 @@ def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a JointState of the state of actuators."""
+    """Return a function that makes a JointState of the state of actuators."""
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -137,7 +140,7 @@ def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def scan_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a LaserScan; where there was no distance it is infinite (REP 117)."""
+    """Return a function that makes a LaserScan. A missing distance is infinite (REP 117)."""
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: RangeData) -> Any:
@@ -159,7 +162,7 @@ class _Speed:
         self._before: tuple[Time, Pose2D] | None = None
 
     def since(self, tm: Time, pose: Pose2D) -> tuple[float, float]:
-        """Return m/s ahead and rad/s since the pose before; 0 for the first one."""
+        """Return m/s ahead and rad/s since the previous pose, or 0 for the first pose."""
         before, self._before = self._before, (tm, pose)
         if before is None or (past_us := tm.us - before[0].us) <= 0:
             return 0.0, 0.0
@@ -172,7 +175,7 @@ class _Speed:
 
 
 def _named(entry: TopicEntry, positions: list[float]) -> list[str]:
-    """Return the names of joints; ValueError if the table has not as many."""
+    """Return the names of joints. Raise ValueError if their number in the table is wrong."""
     names = list(entry.joints) or [f"joint{n}" for n in range(len(positions))]
     if len(names) != len(positions):
         raise ValueError(f"{len(positions)} joints, and {len(names)} names: {', '.join(names)}")

@@ -1,4 +1,4 @@
-"""The table of ports and topics, in TOML; all errors are reported at once.
+"""The table of ports and topics in TOML. All errors are reported at once.
 
 >>> text = '''
 ... [[topic]]
@@ -101,11 +101,11 @@ def parse_table(text: str, name: str) -> topic_entry.TopicTable:
     """Return the table in the text of a file.
 
     Args:
-        text: the text of the whole file.
-        name: name of the file, for messages.
+        text: text of the whole file.
+        name: name of the file for messages.
 
     Raises:
-        ValueError: the table is invalid; the message has a line for each mistake, with file and
+        ValueError: the table is invalid. The message has a line for each mistake, with file and
             line.
     """
     top = read_section(text)
@@ -121,7 +121,7 @@ def parse_table(text: str, name: str) -> topic_entry.TopicTable:
 
 
 def _entry(section: Section, file: str) -> topic_entry.TopicEntry | None:
-    """Return what a table says, None if it is wrong."""
+    """Return the entry of a table, or None if the table is wrong."""
     before = len(section.notes.mistakes)
     words = section.read(_ENTRY)
     kind = words.get("type")
@@ -140,7 +140,7 @@ _FIELDS: Final = {"stop_after": "stop_after_us"}
 
 
 def _check_once(top: Section, entries: Iterable[topic_entry.TopicEntry]) -> None:
-    """Find a pair of port and topic that stands there twice, a topic with two types."""
+    """Report a pair of port and topic that occurs twice, and a topic with two types."""
     pairs: dict[tuple[str, str], topic_entry.TopicEntry] = {}
     kinds: dict[str, topic_entry.TopicEntry] = {}
     for entry in entries:

@@ -1,4 +1,4 @@
-"""What joins a port with a topic, as a line of the table says."""
+"""The entry that joins a port with a topic, which is a line of the table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 _STOP_AFTER_US: Final = 500_000
-"""Silence after which a velocity is taken back, if the table does not say otherwise."""
+"""Default silence after which a velocity is set to zero."""
 
 _VELOCITIES: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 PLACED: Final = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")
@@ -17,7 +17,7 @@ FRAMES: Final = {
     "sensor_msgs/msg/JointState": "",
     "sensor_msgs/msg/LaserScan": "laser",
 }
-"""`frame_id` of messages that have one, where the table names none."""
+"""Default `frame_id` of messages that have one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,16 +25,16 @@ class TopicEntry:
     """A port and its topic.
 
     Attributes:
-        port: full name, such as `Odometry.OdometryPosition`.
-        topic: without the first slash, such as `odom`.
-        type: the message, such as `nav_msgs/msg/Odometry`.
-        frame: `frame_id` of the header.
-        child_frame: the frame whose pose the message has.
+        port: full name of the port, such as `Odometry.OdometryPosition`.
+        topic: name of the topic without the first slash, such as `odom`.
+        type: type of the message, such as `nav_msgs/msg/Odometry`.
+        frame: value of `frame_id` in the header.
+        child_frame: frame whose pose is in the message.
         joints: names of the joints, in the order of the values.
         stop_after_us: time after the last message at which the port gets a zero value, such as
-            standstill; 0 for never.
+            standstill, or 0 for never.
         reliable: whether messages are sent again until they arrive.
-        place: file and line, for people; empty for an entry that is in no file.
+        place: file and line for display, empty for an entry that is in no file.
     """
 
     port: str
@@ -48,12 +48,12 @@ class TopicEntry:
     place: str = ""
 
     def __str__(self) -> str:
-        """Return how people call it."""
+        """Return the entry as text for the user."""
         return f"{self.place}: {self.port}" if self.place else self.port
 
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return an entry with the default frames and stop if it has none."""
+    """Return an entry with the default frames and stop time if it has none."""
     stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")
@@ -65,10 +65,10 @@ class TopicTable:
     """The ports that have topics.
 
     Attributes:
-        entries: an entry for each port of each topic; None joins every port that has a matching
-            message type to a topic of its name.
+        entries: entries with a port and a topic each. None joins every port that has a matching
+            message type to a topic of the port's name.
         diagnostics: topic for the states of the components, empty for none.
-        period_us: interval at which these are published.
+        period_us: interval at which these states are published.
     """
 
     entries: tuple[TopicEntry, ...] | None = None

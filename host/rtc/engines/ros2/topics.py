@@ -1,4 +1,4 @@
-"""What reads the messages of one topic for its port, in the thread of the engine."""
+"""Readers and writers of the messages of one topic for its port, in the thread of the engine."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _WRITER_LOG: Final = log_of(__name__)
 
 
 class TopicWriter:
-    """Writes to a topic; the topic is opened by the first message, or by `open`.
+    """A writer to a topic. The first message, or `open`, opens the topic.
 
     Call all methods in one thread.
 
     Args:
-        participant: takes part in the domain.
-        entry: port and topic.
+        participant: participant in the domain.
+        entry: port and topic of the writer.
 
     Attributes:
-        entry: as given.
+        entry: port and topic of the writer.
     """
 
     def __init__(self, participant: DdsParticipant, entry: TopicEntry) -> None:
@@ -41,7 +41,7 @@ class TopicWriter:
         self._failed = self._closed = False
 
     def open(self) -> None:
-        """Announce the endpoint to peers; log failures in one line."""
+        """Announce the endpoint to peers. Log failures in one line."""
         try:
             if not (self._failed or self._closed):
                 self._writer = self._participant.writer(self.entry)
@@ -56,7 +56,7 @@ class TopicWriter:
 
         Returns:
             INVALID_ARGS if a number of the message does not fit, BUFFER_TIMEOUT if too many
-            messages wait for readers already, PORT_ERROR if the topic cannot be opened.
+            messages wait for readers already, or PORT_ERROR if the topic cannot be opened.
         """
         if self._writer is None:
             self.open()
@@ -75,23 +75,26 @@ class TopicWriter:
         return PortStatus.PORT_OK
 
     def matched(self) -> list[int]:
-        """Return the instance handles of the peers that it is joined with, in any thread."""
+        """Return the instance handles of the matched peers, in any thread."""
         writer = self._writer
         return [] if writer is None else list(writer.get_matched_subscriptions())
 
     def close(self) -> None:
-        """Be gone."""
+        """Remove the endpoint."""
         self._writer, self._closed = None, True
 
 
 _SMALLEST: Final = 1.2e-38
-"""Below it a float32 is denormal; nothing on a robot is so small."""
+"""Limit below which a float32 is denormal. No value on a robot is that small."""
 
 _LOG: Final = log_of(__name__)
 
 
 class _Arrivals(Listener):
-    """Tells that something came; DDS calls it in a thread of its own, where nothing is done."""
+    """A signal that data arrived.
+
+    DDS calls it in a thread of its own, where nothing else is done.
+    """
 
     def __init__(self, notify: Callable[[], None]) -> None:
         self._notify = notify
@@ -102,18 +105,19 @@ class _Arrivals(Listener):
 
 
 class TopicReader:
-    """Reads a topic, and passes on its messages.
+    """A reader of a topic that passes on its messages.
 
-    All methods but the constructor are called in the thread.
+    All methods except the constructor are called in the thread.
 
     Args:
-        participant: takes part in the domain.
-        entry: port and topic.
-        thread: reads.
-        put: called with each message, and with None if no message came for too long.
+        participant: participant in the domain.
+        entry: port and topic of the reader.
+        thread: thread that reads the topic.
+        put: function that is called with each message, and with None if no message came for too
+            long.
 
     Attributes:
-        entry: as given.
+        entry: port and topic of the reader.
     """
 
     def __init__(
@@ -130,7 +134,7 @@ class TopicReader:
         self._heard_s, self._stop_s = 0.0, entry.stop_after_us / 1e6
 
     def open(self) -> None:
-        """Announce the endpoint to peers; log failures in one line."""
+        """Announce the endpoint to peers. Log failures in one line."""
         try:
             if not self._closed:
                 self._reader = self._participant.reader(
@@ -140,16 +144,16 @@ class TopicReader:
             _LOG.warning("%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error))
 
     def matched(self) -> list[int]:
-        """Return the instance handles of the peers that it is joined with, in any thread."""
+        """Return the instance handles of the matched peers, in any thread."""
         reader = self._reader
         return [] if reader is None else list(reader.get_matched_publications())
 
     def close(self) -> None:
-        """Be gone."""
+        """Remove the endpoint."""
         self._reader, self._closed = None, True
 
     def _take(self) -> float | None:
-        """Process received messages one by one: an invalid one does not affect others."""
+        """Process received messages one by one. An invalid message does not affect others."""
         for _ in range(HISTORY):
             if self._reader is None or (found := self._take_one(self._reader)) is None:
                 return None
@@ -159,7 +163,7 @@ class TopicReader:
         return 0
 
     def _take_one(self, reader: Any) -> list[Any] | None:
-        """Return the next message, nothing for an invalid one; None at the end."""
+        """Return the next message, or nothing for an invalid one, or None at the end."""
         try:
             return reader.take(1) or None
         except DDSException as error:
@@ -188,7 +192,7 @@ class TopicReader:
             self._thread.submit(self._watch)
 
     def _watch(self) -> float | None:
-        """Take the latest value back when nothing more has come for too long."""
+        """Reset the latest value when no message has come for too long."""
         left_s = self._heard_s + self._stop_s - time.monotonic()
         if left_s > 0 and not self._closed:
             return left_s
@@ -199,10 +203,10 @@ class TopicReader:
 
 
 def _odd_number(message: object, path: str = "") -> str:
-    """Return the first impossible number of a message, with its value; empty if there is none.
+    """Return the first impossible number of a message with its value, empty if there is none.
 
     Such a number is not finite, or so small that it is an integer reinterpreted as a float.
-    Sequences are not checked: a range without an echo is infinite (REP 117).
+    Sequences are not checked, because a range without an echo is infinite (REP 117).
     """
     for name, value in vars(message).items():
         if isinstance(value, float):

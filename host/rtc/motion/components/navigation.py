@@ -1,4 +1,4 @@
-"""Navigation: one relay point at a time, with the mode and speed to get there."""
+"""Navigation, which provides one relay point at a time, with the mode and speed to reach it."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ _TUNED = {
     "creep_vel": "0.01",
     "latency": "0.08",
 }
-"""The set `tuned`: turn before driving, brake to the end of the line (rh3-control, J)."""
+"""Values of the set `tuned`: turn before driving, brake to the end of the line (rh3-control, J)."""
 
 
 class Navigation(RtComponent):
     """The state machine of the reference hardware's navigation (rh3-control, state machine).
 
-    It is evaluated once for each new pose. The parameters after `max_vel` are additions; their
-    defaults are the constants of the reference hardware. With `braking` above 0 it commands a speed
-    for each pose, so that the cart can stop at the end of the line with that deceleration;
-    `latency` is the time from a pose to the effect of the command.
+    The state machine is evaluated once for each new pose. The parameters after `max_vel` are
+    additions. Their defaults are the constants of the reference hardware. With `braking` above 0,
+    the component commands a speed for each pose, so that the cart can stop at the end of the line
+    with that deceleration. `latency` is the time from a pose to the effect of the command.
 
-    An empty list means stop and FINISH. A new list replaces the old one without a stop. A list with
-    an invalid number is ignored.
+    An empty list means stop and FINISH. A new list replaces the old list without a stop. A list
+    with an invalid number is ignored.
 
     Attributes:
-        state: the state that is written to the port each period.
+        state: state that is written to the port each period.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Navigation", "Relay points, one at a time")
@@ -67,12 +67,12 @@ class Navigation(RtComponent):
         self._at, self._fresh, self._v = 0, False, 0.0
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin with nowhere to go."""
+        """Begin without a goal."""
         self._forget()
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take a new list, judge a new pose, write the state."""
+        """Take a new list, judge a new pose, and write the state."""
         now = Time.from_us(ec.now_us)
         if (way := ports.read_newest(self.min_path)) is not None:
             self._start(now, way)
@@ -127,7 +127,7 @@ class Navigation(RtComponent):
             self._next(now)
 
     def _approach(self, now: Time, relay: Pose, pose: Pose) -> None:
-        """Drive to the line across the relay point, slower near it."""
+        """Drive to the line across the relay point, with lower speed near it."""
         over, braking = relay.along(pose), self.braking.value > 0
         if braking:
             if over > -self.goal_distance.value:

@@ -1,4 +1,4 @@
-"""Odometry: wheel angles become a pose."""
+"""Odometry, which converts wheel angles into a pose."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 
 
 class Odometry(RtComponent):
-    """Integrates the movement of both wheels on exact arcs, for the middle of the drive axle.
+    """A component that integrates the wheel motion on exact arcs, for the middle of the drive axle.
 
     The port LocalizedPosition exists and is unused, as in the specification. A message is ignored
     if its angles are not numbers, or if it has fewer angles than there are ids of wheels.
 
     Attributes:
-        pose: the estimated pose of the cart.
+        pose: estimated pose of the cart.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Odometry", "Pose from wheel angles")
@@ -50,7 +50,7 @@ class Odometry(RtComponent):
         self._before: tuple[float, float] | None = None
 
     def load(self, path: Path) -> None:
-        """Replace values in the configuration sets by those of a file such as Odometry.conf.
+        """Replace values in the configuration sets by values of a file such as Odometry.conf.
 
         Raises:
             OSError: the file cannot be read.
@@ -61,13 +61,13 @@ class Odometry(RtComponent):
             self.configuration.add_set(set_id, {**held, **values})
 
     def calibrate(self, wheels: Wheels) -> None:
-        """Set radii and axle; RtcRefused if one is not above 0."""
+        """Set radii and axle. Raise RtcRefused if a length is not above 0."""
         for parameter, value in zip(self._geometry, wheels, strict=True):
             self.configuration.set(parameter.name, repr(value))
 
     @property
     def wheels(self) -> Wheels:
-        """Radii and axle that hold."""
+        """Radii and axle that apply."""
         return Wheels(*(parameter.value for parameter in self._geometry))
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -78,12 +78,12 @@ class Odometry(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Forget the way."""
+        """Forget the last wheel angles."""
         self._before = None
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Add what the wheels have turned since the last angles."""
+        """Add the rotation of the wheels since the last angles."""
         for sample in read_all(self.angles):
             self._add(sample)
         return ReturnCode.RTC_OK
@@ -109,7 +109,7 @@ def read_conf(path: Path) -> dict[str, dict[str, str]]:
 
     Raises:
         OSError: the file cannot be read.
-        RtcRefused: a line begins with `conf.` but has another form; the message has the line.
+        RtcRefused: a line begins with `conf.` but has another form. The message has the line.
     """
     sets: dict[str, dict[str, str]] = {}
     for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):

@@ -1,4 +1,4 @@
-"""OmniTo2WD: a goal or a path becomes turns on the spot and straight lines."""
+"""OmniTo2WD, which converts a goal or a path into turns on the spot and straight lines."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedState
 
 _LEAST_WAY_M: Final = 1e-6
-"""Metres that are no way: the heading of such a step would mean nothing."""
+"""Distance in m below which a step has no meaningful heading."""
 
 _LOG: Final = log_of(__name__)
 
 
 class OmniTo2WD(RtComponent):
-    """Plans for a cart that cannot go sideways; it never goes backward.
+    """A planner for a cart that cannot go sideways. It never goes backward.
 
     A step of zero length is left out. A goal or a path with an invalid number is ignored, and a
     line is logged. FINISH is written only once, when the goal is reached, so that the end of an
-    earlier command is not taken for that of a later one.
+    earlier command is not taken for the end of a later command.
 
     Attributes:
         refused: number of ignored goals and paths.
@@ -54,7 +54,7 @@ class OmniTo2WD(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Plan what arrived, and write what has finished."""
+        """Plan for new input, and write FINISH."""
         if (latest := ports.read_newest(self.current_position)) is not None:
             self._pose = ports.to_pose(latest.data) or self._pose
         for message in ports.read_all(self.goal):
@@ -66,7 +66,7 @@ class OmniTo2WD(RtComponent):
         return ReturnCode.RTC_OK
 
     def _take(self, message: iis.TimedPose2D) -> None:
-        """Take a goal, or a point of a path; what came before gives way."""
+        """Take a goal, or a point of a path. It replaces earlier goals."""
         kind = message.id[0] if message.id else None
         if kind not in (position_input.INTERMEDIATE_POINT, position_input.END_POINT):
             self._points = []
@@ -99,10 +99,10 @@ class OmniTo2WD(RtComponent):
 
 
 def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
-    """Return where to turn and where to go straight to (RH3 specification, path calculation).
+    """Return the turns and straight lines of a path (RH3 specification, path calculation).
 
-    The list begins with the start. For each point it has two poses: the previous place with the
-    heading to the point, and the point with that heading. It ends with the last point in its
+    The list begins with the start. For each point, it has two poses: the previous place with the
+    heading to the point, and the point with that heading. The list ends with the last point in its
     wanted heading.
 
     >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]

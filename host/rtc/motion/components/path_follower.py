@@ -1,4 +1,4 @@
-"""PathFollower: a velocity for each period, out of a relay point and a pose."""
+"""PathFollower, which computes a velocity for each period from a relay point and a pose."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from tickrig.wire.rtc_types.rtc import Path
 _Mode = Callable[[Path, Pose, Pose], Twist]
 
 _TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
-"""The set `tuned` (rh3-control, J)."""
+"""Values of the set `tuned` (rh3-control, J)."""
 
 
 class PathFollower(RtComponent):
-    """Runs one mode until the next message (rh3-control, control laws).
+    """A follower that runs one mode until the next message (rh3-control, control laws).
 
-    Modes:
+    The modes are:
 
-    - free and stop, both towards standstill;
-    - line, to-point, and circle (centre x, y, radius r, to the left if positive);
-    - spin, and velocity (v, w);
-    - wheel velocity (v left, w right, rad/s, by `tread` and `radius`).
+    - free and stop, both towards standstill
+    - line, to-point, and circle (centre x, y, radius r, to the left if positive)
+    - spin, and velocity (v, w)
+    - wheel velocity (v left, w right, rad/s, by `tread` and `radius`)
 
-    A message with an invalid number means stop. Without a pose for `pose_timeout` the cart stops,
+    A message with an invalid number means stop. Without a pose for `pose_timeout`, the cart stops,
     because its position is unknown. The parameters after `max_w` are additions:
 
-    - `acc_cycle` is the time for which `max_acc_*` are given;
-    - `law` is the way the regulator steps;
-    - `spin` is the way the cart turns;
-    - `latency` is the time from a pose to the effect of the command.
+    - `acc_cycle` is the time for which `max_acc_*` are given
+    - `law` is the integration method of the regulator
+    - `spin` is the method by which the cart turns
+    - `latency` is the time from a pose to the effect of the command
 
     Attributes:
-        twist: the command of the latest period.
+        twist: command of the latest period.
         path: the current path.
     """
 
@@ -107,7 +107,7 @@ class PathFollower(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take one message, make a step of its mode, command the velocity."""
+        """Take one message, make a step of its mode, and command the velocity."""
         if self.target_path.is_new and (path := self.target_path.read()) is not None:
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
             self.path = path if plausible(*numbers) else Path(RunMode.STOP)
@@ -123,7 +123,7 @@ class PathFollower(RtComponent):
         return control_laws.VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
     def _update_pose(self, ec: ExecutionContext) -> Pose | None:
-        """Read new poses; return the latest, or None if no pose came for `pose_timeout`."""
+        """Read new poses. Return the latest pose, or None if no pose came for `pose_timeout`."""
         if (pose := read_newest_pose(self.position)) is not None:
             self._pose, self._received_us = pose, ec.now_us
         elif ec.now_us - self._received_us > self.pose_timeout.value * 1e6:
@@ -154,7 +154,7 @@ class PathFollower(RtComponent):
         return twist_of(path.v * radius, path.w * radius, self.tread.value)
 
     def _to_point(self, path: Path, target: Pose, pose: Pose) -> Twist:
-        """Follow the line and slow down towards its end, as fast as it is far in metres."""
+        """Follow the line with a speed limit in m/s that equals the distance to its end in m."""
         if target.along(pose) > 0:
             return Twist()
         v = clip(path.v, pose.distance(target))

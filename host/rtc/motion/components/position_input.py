@@ -1,4 +1,4 @@
-"""PositionInput: goals and paths that a person enters."""
+"""PositionInput, at which a user enters goals and paths."""
 
 from __future__ import annotations
 
@@ -17,27 +17,30 @@ from tickrig.wire.rtc_types.rtc import Time, TimedState
 START_POINT: Final = 100
 INTERMEDIATE_POINT: Final = 101
 END_POINT: Final = 102
-"""`id[0]` of the points of a path; a goal has none."""
+"""Value of `id[0]` in the points of a path. A goal has none."""
 
 _DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
-"""The default of `PositionInput.defined_path`: a square of 1 m, back to the origin."""
+"""Default of `PositionInput.defined_path`, which is a square of 1 m, back to the origin."""
 
 USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
-"""What a person types: metres and degrees; a file has radians."""
+"""Text of the possible inputs, in metres and degrees. A file has radians."""
 
 
 class PositionInput(RtComponent):
-    """Sends one command after the other, each after the previous one has finished.
+    """A component that sends one command after the other.
 
-    The original waits at its console in on_execute. This component does not block: the owner of the
+    Each waits for the previous one to finish.
+
+    The original waits at its console in on_execute. This component does not block. The owner of the
     console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
     configuration is declared and unused, as in the original.
 
     Attributes:
         finished: number of finished commands.
-        defined_path: the path of the command `path` without a file or points.
-        prompt: called with the possible inputs whenever it needs a command; the console prints it.
-        report: called with each command that it sends, and with FINISH.
+        defined_path: path of the command `path` without a file or points.
+        prompt: function that is called with the possible inputs whenever the component needs a
+            command. The console prints them.
+        report: function that is called with each command that the component sends, and with FINISH.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositionInput", "Goals and paths from the console")
@@ -62,14 +65,14 @@ class PositionInput(RtComponent):
 
     @property
     def idle(self) -> bool:
-        """Whether no command waits or runs."""
+        """Whether no command is waiting or running."""
         return not (self._commands or self._running)
 
     def goal(self, pose: Pose) -> None:
-        """Enter a goal; it runs after those before it.
+        """Enter a goal. It runs after the earlier commands.
 
         Raises:
-            ValueError: an invalid number.
+            ValueError: a number is invalid.
         """
         self._commands.append((_point(pose),))
 
@@ -77,15 +80,16 @@ class PositionInput(RtComponent):
         """Enter a path of two points or more.
 
         Raises:
-            ValueError: fewer points, or an invalid number.
+            ValueError: there are fewer than two points, or a number is invalid.
         """
         self._commands.append(_points(poses))
 
     def replace(self, *poses: Pose) -> None:
-        """Enter a goal, or a path of several points, in place of the running and waiting ones.
+        """Enter a goal or a path in place of the running and waiting commands.
 
         Raises:
-            ValueError: no point, or an invalid number; the running command continues.
+            ValueError: there is no point, or a number is invalid. The running command then
+                continues.
         """
         command = (_point(*poses),) if len(poses) == 1 else _points(poses)
         self._commands.clear()
@@ -93,11 +97,11 @@ class PositionInput(RtComponent):
         self._commands.append(command)
 
     def typed(self, line: str) -> None:
-        """Enter a command as a person types it, see `USAGE`; it runs after the earlier commands.
+        """Enter a command as text; see `USAGE`. It runs after the earlier commands.
 
         Raises:
-            ValueError: the command is unknown, a pose or path is invalid, a file cannot be read,
-                or `end` was typed before; the commands do not change then.
+            ValueError: the command is unknown, a pose or path is invalid, a file cannot be read, or
+                `end` was typed before. The commands do not change then.
         """
         self.require_open()
         word, _, rest = line.strip().partition(" ")
@@ -120,21 +124,21 @@ class PositionInput(RtComponent):
             raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
 
     def end(self) -> None:
-        """Go into Error when all has finished, as the original does after its last command."""
+        """Move to Error when all commands have finished, as the original does at its end."""
         self._ending = True
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Ask again."""
+        """Prompt again for a command."""
         self._prompted = False
         return ReturnCode.RTC_OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Take commands again after `end`."""
+        """Accept commands again after `end`."""
         self._ending = False
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Send the next command, or look whether the last one has finished."""
+        """Send the next command, or check whether the last command has finished."""
         status = ports.read_newest(self.status)
         if self._running and status is not None and status.data == ports.NavigationState.FINISH:
             self._running = self._prompted = False

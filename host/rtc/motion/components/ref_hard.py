@@ -1,4 +1,4 @@
-"""RefHardRh3: the cart's velocity becomes wheel speeds on an RS485 line."""
+"""RefHardRh3, which converts the cart's velocity into wheel speeds on an RS485 line."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedDoubleSeq
 
 _MAX_MISSES: Final = 5
-"""Number of requests in a row, unanswered or refused, that bring the component to Error.
+"""Number of successive unanswered or refused requests that bring the component to Error.
 
 rh3-control proposes 3. If a fifth of all exchanges is lost, this happens once in ten minutes.
 """
 
 _GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
-"""Of position and of velocity."""
+"""Gains of the position and the velocity loop."""
 
 _WATCHDOG_MS: Final = 500
 """Silence after which the base stops by itself."""
@@ -49,7 +49,7 @@ _MODE: Final = modbus.Request(modbus.READ, (modbus.Address.MODE, 1))
 _LOG: Final = log_of(__name__)
 
 Opener = Callable[[str], Link[bytes]]
-"""Opens the line that DeviceFileName names."""
+"""Function that opens the line that DeviceFileName names."""
 
 
 class RefHard(Protocol):
@@ -63,33 +63,37 @@ class RefHard(Protocol):
 
 
 class RefHardRh3(RtComponent):
-    """Exchanges data with the base once a period: sends speeds and receives wheel angles.
+    """A component that exchanges data with the base once a period.
 
-    In on_execute it reads the answer of the previous period and writes the wheel angles. In
-    on_state_update, after all components have executed, it sends the speeds of this period. So it
-    does not wait, and a command is on the line in the period in which it was made.
+    It sends speeds and receives angles.
 
-    It goes into Error in these cases; the base then stops by its own watchdog:
+    In on_execute, the component reads the answer of the previous period and writes the wheel
+    angles. In on_state_update, after all components have executed, it sends the speeds of this
+    period. Therefore it does not wait, and a command is on the line in the period in which it was
+    made.
 
-    - the base has a fault;
-    - the base refuses, or does not answer, `_MAX_MISSES` requests in a row;
-    - the line is closed.
+    The component goes to Error in these cases, in which the base then stops by its own watchdog:
 
-    While the bumper is pressed, and after `Stop`, it commands standstill. If a wheel would be
-    faster than Velocity_limit, both wheels are slowed down by the same factor.
+    - the base has a fault
+    - the base refuses, or does not answer, `_MAX_MISSES` requests in a row
+    - the line is closed
 
-    First it requests the identification of the device, and writes nothing before the device has
-    answered as a base does. With `AnyDevice` set to 1 it does not request it.
+    While the bumper is pressed, and after `Stop`, the component commands standstill. If a wheel
+    would be faster than Velocity_limit, both wheels are slowed down by the same factor.
+
+    First, the component requests the identification of the device. It writes nothing before the
+    device has answered as a base does. With `AnyDevice` set to 1, it does not request the
+    identification.
 
     Not emulated: the library libsvm and its protocol, whose texts are not public.
 
     Args:
         instance_name: name of the component.
-        open_link: opens the line; by pyserial unless given.
+        open_link: function that opens the line. By default, it is opened by pyserial.
 
     Attributes:
-        report: the latest report of the base.
-        error_reason: the reason of the latest Error.
+        report: latest report of the base.
+        error_reason: reason of the latest Error.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")
@@ -132,7 +136,7 @@ class RefHardRh3(RtComponent):
 
     @property
     def lost(self) -> int:
-        """Requests that had no answer since the line was opened."""
+        """Number of requests that had no answer since the line was opened."""
         return self._master.lost if self._master else 0
 
     def Stop(self) -> None:  # noqa: N802 - as in the IDL
@@ -140,11 +144,11 @@ class RefHardRh3(RtComponent):
         self._stopped = True
 
     def Go(self) -> None:  # noqa: N802
-        """Let the velocity at the port hold again."""
+        """Let the velocity at the port apply again."""
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and order settings and power; a fault of the base is cleared."""
+        """Open the line, and write settings and power. A fault of the base is cleared."""
         self._forget()
         self.velocity.clear()
         if not all(constant.value for constant in self.constants):
@@ -170,7 +174,7 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Stop the base on its ramp, and give the line back."""
+        """Stop the base on its ramp, and release the line."""
         if self._master is not None:
             try:
                 if self._identified:
@@ -182,7 +186,7 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take the answer of the period before."""
+        """Read the answer of the previous period."""
         if self._master is None:
             return self._failed("no line")
         try:
@@ -196,7 +200,7 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Send what is to be sent in this period."""
+        """Send the speeds of this period."""
         if (latest := read_newest(self.velocity)) is not None:
             v, w = latest.data.vx, latest.data.va
             self._twist = Twist(v, w) if plausible(v, w) else Twist()
@@ -216,7 +220,7 @@ class RefHardRh3(RtComponent):
         return min(round(parameter.value * self._counts_per_rad), _TURN // 2 - 1)
 
     def _cycle(self) -> modbus.Request:
-        """Return the exchange of a period: speeds there, report back."""
+        """Return the exchange of a period, which sends speeds and receives a report."""
         bumped = self.report is not None and bool(self.report.status & modbus.Status.BUMPER)
         twist = Twist() if self._stopped or bumped else self._twist
         speeds = wheel_speeds(
@@ -259,13 +263,13 @@ class RefHardRh3(RtComponent):
 
     @property
     def _stranger(self) -> str:
-        """What a failure adds as long as the device may be something else than a base."""
+        """Addition to a failure text while the device may be another device than a base."""
         if self._identified:
             return ""
         return "; not an RH3 base, so nothing was written (rh3 --any-device goes on)"
 
     def _turn(self, report: modbus.Report) -> None:
-        """Add what the counters counted; they begin again after 2**32."""
+        """Add the change of the counters, which begin again after 2**32."""
         counts = (report.left, report.right)
         for place, constant in enumerate(self.constants):
             change = (counts[place] - self._counts[place] + _TURN // 2) % _TURN - _TURN // 2
@@ -283,7 +287,7 @@ def _write(address: modbus.Address, *values: int) -> modbus.Request:
 
 
 def _fault_text(left: modbus.Fault, right: modbus.Fault) -> str:
-    """Return the faults of both wheels, each with the wheels that have it.
+    """Return the fault texts, each with the wheels that have the fault.
 
     >>> _fault_text(modbus.Fault.EMERGENCY_STOP | modbus.Fault.STALL, modbus.Fault.EMERGENCY_STOP)
     'stall (left), emergency stop (left, right)'
@@ -301,7 +305,7 @@ def _name(bit: int) -> str:
 
 
 def _refusal_text(request: modbus.Request, code: modbus.ExceptionCode | int) -> str:
-    """Return which request was refused, and why.
+    """Return which request was refused, and the reason.
 
     >>> _refusal_text(modbus.Request(3, (0x10, 1)), modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
     'function 03h at 0010h: illegal data address'

@@ -1,4 +1,4 @@
-"""Follower: a robot goes after another by its position (RSi2/NEDO report, experiment A)."""
+"""Follower, with which a robot follows another by its position (RSi2/NEDO report, experiment A)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tickrig.wire.rtc_types import iis
 
 
 class Follower(RtComponent):
-    """Keeps a distance to the robot whose self-position arrives at `leader`.
+    """A component that keeps a distance to the robot whose self-position arrives at `leader`.
 
-    Both positions are in one map frame. If the leader is nearer than `gap`, the robot stands; it
-    never goes back. A base on two wheels turns to the leader and goes. With `sideways` the robot
+    Both positions are in one map frame. If the leader is nearer than `gap`, the robot stands. It
+    never goes back. A base on two wheels turns to the leader and goes. With `sideways`, the robot
     goes straight to its wanted position and takes over the leader's heading. If either position is
     missing for `pose_timeout`, the robot stands. The connector decides which robot leads.
 
-    The report gives no control law; this law, its gains and its limits are additions.
+    The report gives no control law. This law, its gains and its limits are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Follower", "Follows another robot")

@@ -1,4 +1,4 @@
-"""GamePad: a hand on sticks or keys becomes velocities."""
+"""GamePad, which converts sticks or keys into velocities."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tickrig.wire.rtc_types import iis
 
 
 class _GamePadDevice(Protocol):
-    """A device with sticks or keys; reading it does not wait."""
+    """A device with sticks or keys. Reading it does not wait."""
 
     def poll(self, now_us: int, /) -> StickPosition:
-        """Return where the hand pushes now; LinkClosed if the device is gone."""
+        """Return the present deflection. Raise LinkClosed if the device is gone."""
         ...
 
     def close(self) -> None:
@@ -30,7 +30,7 @@ class _GamePadDevice(Protocol):
 
 
 _GamePadOpener = Callable[[str], _GamePadDevice]
-"""Opens the pad that DeviceFileName names; LinkClosed if it cannot."""
+"""Function that opens the pad that DeviceFileName names, or raises LinkClosed."""
 
 
 _KEYS: Final[Mapping[str, StickPosition]] = {
@@ -44,17 +44,17 @@ _KEYS: Final[Mapping[str, StickPosition]] = {
 }
 
 _HOLD_US: Final = 300_000
-"""A key pushes so long after it came; terminals repeat it sooner than that."""
+"""Time for which a key stays pressed after its arrival. Terminals repeat keys faster."""
 
 
 class KeyboardPad:
-    """Reads keys of a terminal: w s forward and back, a d turn, q e sideways, space stop.
+    """A pad of terminal keys: w s forward and back, a d turn, q e sideways, space stop.
 
     Args:
-        fd: file descriptor of the terminal; standard input unless given.
+        fd: file descriptor of the terminal. By default, it is standard input.
 
     Attributes:
-        close: restores the settings of the terminal.
+        close: function that restores the settings of the terminal.
 
     Raises:
         LinkClosed: the file is not a terminal.
@@ -69,7 +69,7 @@ class KeyboardPad:
         self._hand, self._until_us = StickPosition(), 0
 
     def poll(self, now_us: int, /) -> StickPosition:
-        """Return where the latest key pushes."""
+        """Return the deflection of the latest key."""
         for key in os.read(self._fd, 256).decode("latin-1"):
             if key in _KEYS:
                 self._hand, self._until_us = _KEYS[key], now_us + _HOLD_US
@@ -80,18 +80,18 @@ _KEYBOARD: Final = "keyboard"
 
 
 def open_pad(name: str) -> _GamePadDevice:
-    """Open `keyboard`, or a device such as `/dev/input/event5`; LinkClosed if it cannot be."""
+    """Open `keyboard` or a device such as `/dev/input/event5`. Raise LinkClosed if that fails."""
     return KeyboardPad() if name == _KEYBOARD else EvdevPad(name)
 
 
 class GamePad(DeviceComponent[_GamePadDevice]):
-    """Writes a velocity each period while a stick is deflected, and one of 0 when it is released.
+    """A component that writes a velocity in each period while a stick is deflected, then 0 once.
 
-    The specification has only its name; ports and parameters are additions.
+    The specification has only the name of the component. Ports and parameters are additions.
 
     Args:
         instance_name: name of the component.
-        opener: opens the pad.
+        opener: function that opens the pad.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GamePad", "Velocities from a game pad or keyboard")
@@ -113,7 +113,7 @@ class GamePad(DeviceComponent[_GamePadDevice]):
         return self._opener(self.device.value)
 
     def exchange(self, ec: ExecutionContext, client: _GamePadDevice) -> None:
-        """Look where the hand pushes."""
+        """Read the deflection."""
         forward, left, turn = (self._outside_dead_zone(part) for part in client.poll(ec.now_us))
         pushed = any((forward, left, turn))
         if pushed or self._pushed:

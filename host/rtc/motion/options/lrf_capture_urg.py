@@ -1,4 +1,4 @@
-"""LRFCapture_URG: scans of a range finder become range data."""
+"""LRFCapture_URG, which converts scans of a range finder into range data."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
 
 class LrfCaptureUrg(DeviceComponent[UrgClient]):
-    """Makes a sensor measure while the component is Active, and writes each scan.
+    """A component that makes a sensor measure while it is Active, and writes each scan.
 
     A range of 0 means that there was no distance. The specification has only the name of the
-    component (LRFCapture_URG); ports and parameters are additions.
+    component (LRFCapture_URG). Ports and parameters are additions.
 
     Args:
         instance_name: name of the component.
-        open_link: opens the line; by pyserial unless given.
+        open_link: function that opens the line. By default, it is opened by pyserial.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("LRFCapture_URG", "Range data of a URG")
@@ -35,11 +35,11 @@ class LrfCaptureUrg(DeviceComponent[UrgClient]):
         self._open_link = open_link
 
     def open_client(self) -> UrgClient:
-        """Open the line, and let the sensor measure."""
+        """Open the line, and make the sensor measure."""
         return UrgClient(self._open_link(self.device.value), self.cluster.value)
 
     def exchange(self, ec: ExecutionContext, client: UrgClient) -> None:
-        """Write the scans that have come."""
+        """Write the scans that have arrived."""
         for scan in client.poll():
             self.ranges.write(_range_data(Time.from_us(ec.now_us), scan))
 

@@ -1,4 +1,4 @@
-"""From range data to a base that stops: points, the nearest in the way, two that react."""
+"""Components from range data to a stopping base: points, the nearest obstacle, two reactions."""
 
 from __future__ import annotations
 
@@ -29,15 +29,16 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, RangeData, TimedDouble
 
 _ANY: Final = 1e9
-"""A limit that limits nothing."""
+"""Value of a limit that has no effect."""
 
 _LOG: Final = log_of(__name__)
 
 
 class UrgToObstacles(RtComponent):
-    """Writes the places of obstacles in the frame of the robot: x ahead of the axle, y to the left.
+    """A component that writes the places of obstacles in the frame of the robot.
 
-    The specification has only its name (Urg_to_Obstacles); ports and parameters are additions.
+    x is ahead of the axle, and y is to the left. The specification has only the name of the
+    component (Urg_to_Obstacles). Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Urg_to_Obstacles", "Points out of range data")
@@ -49,7 +50,7 @@ class UrgToObstacles(RtComponent):
         self.obstacles = self.add_port(OutPort("obstacles", iis.TimedPose2DSeq))
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take the newest scan."""
+        """Convert the newest scan."""
         if (scan := read_newest(self.ranges)) is not None:
             points = tuple(self._points(scan))
             self.obstacles.write(iis.TimedPose2DSeq(scan.tm, data=points))
@@ -65,16 +66,16 @@ class UrgToObstacles(RtComponent):
 
 @lru_cache(maxsize=8)  # each scan has the same: a third of the time of its points
 def _directions(first: float, step: float, count: int) -> Sequence[tuple[float, float]]:
-    """Return where the beams of a scan go, as vectors of length 1."""
+    """Return the directions of the beams of a scan as unit vectors."""
     angles = [first + n * step for n in range(count)]
     return tuple((cos(angle), sin(angle)) for angle in angles)
 
 
 class ObstacleMonitor(RtComponent):
-    """Measures the free distance in the lane straight ahead of the robot.
+    """A component that measures the free distance in the lane straight ahead of the robot.
 
-    `distance` is measured from the front of the robot; the value `range` means a free lane.
-    The specification has only its name; ports and parameters are additions.
+    `distance` is measured from the front of the robot. The value `range` means a free lane. The
+    specification has only the name of the component. Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstacleMonitor", "Distance to what is in the way")
@@ -89,7 +90,7 @@ class ObstacleMonitor(RtComponent):
         self.distance = self.add_port(OutPort("distance", TimedDouble))
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Measure the newest points."""
+        """Evaluate the newest points."""
         if (seen := read_newest(self.obstacles)) is not None:
             self.distance.write(TimedDouble(seen.tm, self._nearest(seen)))
         return ReturnCode.RTC_OK
@@ -102,25 +103,25 @@ class ObstacleMonitor(RtComponent):
 
 
 class _WatchedDistance:
-    """The way is blocked below one distance, free above another, and blocked without a distance.
+    """A distance with hysteresis. The lane is blocked below one value, and free above another.
 
     Args:
         port: port at which distances arrive.
 
     Attributes:
-        free: whether the way is free; False before the first distance.
+        free: whether the lane is free. It is False before the first distance.
     """
 
     def __init__(self, port: InPort[TimedDouble]) -> None:
         self._port, self.free, self._received_us = port, False, 0
 
     def forget(self) -> None:
-        """Start again."""
+        """Reset the lane to blocked, and the time of the last distance."""
         self._port.clear()
         self.free, self._received_us = False, 0
 
     def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
-        """Take the newest distance; return whether the way is free."""
+        """Take the newest distance. Return whether the lane is free."""
         latest = read_newest(self._port)
         if latest is not None and plausible(latest.data):
             self._received_us = ec.now_us
@@ -131,12 +132,13 @@ class _WatchedDistance:
 
 
 class ObstaclesAvoidance(RtComponent):
-    """Stops the cart before obstacles; works between PathFollower and base, plans no way around.
+    """A component between PathFollower and base that stops the cart before obstacles.
 
-    Forward motion ends when an obstacle is nearer than `stop_distance`, and continues when it is
-    farther than `go_distance`; both with `max_acc_v`. Commands to turn on the spot and to go back
-    always pass. Without a velocity for `timeout` the component writes nothing, so that the base's
-    own watchdog acts. The specification has only its name; ports and parameters are additions.
+    The component plans no way around. Forward motion ends when an obstacle is nearer than
+    `stop_distance`, and continues when it is farther than `go_distance`. Both use `max_acc_v`.
+    Commands to turn on the spot and to go back always pass. Without a velocity for `timeout`, the
+    component writes nothing, so that the base's own watchdog acts. The specification has only the
+    name of the component. Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstaclesAvoidance", "Stop and go")
@@ -155,13 +157,13 @@ class ObstaclesAvoidance(RtComponent):
         self._before = Twist()
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at standstill, with the way blocked."""
+        """Begin at standstill with the lane blocked."""
         self._watched.forget()
         self._before = Twist()
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Pass the velocity on, as far as the way is free."""
+        """Pass on the velocity as far as the lane is free."""
         free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )
@@ -181,11 +183,12 @@ class ObstaclesAvoidance(RtComponent):
 
 
 class CollisionDetection(RtComponent):
-    """Calls Stop when something is nearer than `stop_distance`, Go when the way is free again.
+    """A component that calls Stop if an obstacle is nearer than `stop_distance`, and Go afterwards.
 
-    Without a distance for `timeout` it calls Stop, because there may be an obstacle. When it is
-    deactivated it calls Go, if it had called Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard.
-    The specification has only its name; ports and parameters are additions.
+    Go is called when the lane is free again. Without a distance for `timeout`, the component calls
+    Stop, because there may be an obstacle. When it is deactivated, it calls Go, if it had called
+    Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard. The specification has only the name of the
+    component. Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("CollisionDetection", "Stops the base at once")
@@ -203,7 +206,7 @@ class CollisionDetection(RtComponent):
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin with the way blocked."""
+        """Begin with the lane blocked."""
         self._watched.forget()
         return ReturnCode.RTC_OK
 
@@ -214,7 +217,7 @@ class CollisionDetection(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Look, and call."""
+        """Evaluate the distance, and call Stop or Go."""
         free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )
@@ -241,15 +244,15 @@ _LATEST: Final = {"dataport.buffer.length": "8"}
 class CollisionGuard:
     """The components between a range finder and the base, in the context of a chain.
 
-    PathFollower is joined to ObstaclesAvoidance in the place of RefHardRh3.
+    PathFollower is joined to ObstaclesAvoidance in place of RefHardRh3.
 
     Args:
-        manager: runs the chain.
-        chain: the chain of a cart.
-        open_urg: opens the line to its range finder.
+        manager: manager that runs the chain.
+        chain: chain of a cart.
+        open_urg: function that opens the line to the range finder of the cart.
 
     Attributes:
-        monitor: the component whose `distance` the others use.
+        monitor: component whose `distance` the other components use.
     """
 
     def __init__(self, manager: Manager, chain: MotionChain, open_urg: Opener) -> None:
@@ -278,5 +281,5 @@ class CollisionGuard:
         manager.connect(f"{detection.instance_name}.BumpRefHard", f"{base}.BumpRefHard")
 
     def activate(self) -> None:
-        """Ask all for Active."""
+        """Request Active of all components."""
         self._manager.activate(*(component.instance_name for component in self.components))

@@ -1,4 +1,4 @@
-"""SwitchInput: who drives, a hand or the planner."""
+"""SwitchInput, which selects the joystick or the planner."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _LOG: Final = log_of(__name__)
 
 
 class SwitchInput(RtComponent):
-    """The joystick has priority; the planner resumes `hold` after the stick is released.
+    """A switch with priority for the joystick. The planner resumes `hold` after its release.
 
-    During `hold` the cart stands. A deflected joystick without a message for `stale` counts as
+    During `hold`, the cart stands. A deflected joystick without a message for `stale` counts as
     released. A velocity with an invalid number counts as 0. The specification has only the name of
-    the component (SwitchInputRTC); ports and parameters are additions.
+    the component (SwitchInputRTC). Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
