@@ -49,7 +49,7 @@ class _Verbs(LazyGroup):
 @click.group(cls=_Verbs, commands=_VERBS)
 @version_option()
 def main() -> None:
-    """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.
+    """Watch, decode, send, replay and check CAN traffic of a bus, a log file or standard input.
 
     \b
     canmon dump can0                              frames, and what they mean

@@ -53,11 +53,11 @@ class _Case(NamedTuple):
 @click.option("--jsonl", "--json", "as_json", is_flag=True, help="Findings as JSON, one a line.")
 @click.option("--junit", "report", type=PATH, metavar="FILE", help="Write a JUnit report.")
 def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | None) -> None:
-    """Check EDS files and print all findings; exit status 1 if there is an error.
+    """Check EDS files and print all findings. The exit status is 1 if there is an error.
 
-    A finding is a line: file, line, severity, rule, the value and the allowed ones, the fix, and
-    the clause of the standard. Notes never count; warnings do with --strict. Exit status 2: a file
-    cannot be read, or the report cannot be written.
+    A finding is a line with file, line, severity, rule, the value and the allowed values, the fix,
+    and the clause of the standard. Notes never count. Warnings count with --strict. The exit status
+    is 2 if a file cannot be read, or if the report cannot be written.
 
     \b
     canmon eds check drive.eds
@@ -161,12 +161,12 @@ _LEFT: Final = 1
     help="Encoding of FILE if not Unicode, such as cp1252 or cp850. [guessed]",
 )
 def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_encoding: str) -> None:
-    """Fix an EDS; exit status 1 if errors or warnings are left.
+    """Fix an EDS. The exit status is 1 if errors or warnings are left.
 
-    Lines without a finding are unchanged to the byte, unless the file is not Unicode: then it
+    Lines without a finding are unchanged to the byte, unless the file is not Unicode. Such a file
     becomes UTF-8, and the assumed encoding is printed. The output lists the fixes with the lines of
-    FILE, and the remaining findings, which need knowledge of the device, with those of OUT. XDD
-    files cannot be fixed.
+    FILE. It also lists the remaining findings, which need knowledge of the device, with the lines
+    of OUT. XDD files cannot be fixed.
 
     \b
     canmon eds fix drive.eds -o fixed.eds
@@ -324,10 +324,11 @@ _DIFFERENT: Final = 1
 @click.argument("new", type=PATH)
 @click.option("--jsonl", "--json", "as_json", is_flag=True, help="Differences as JSON, one a line.")
 def compare(old: Path, new: Path, as_json: bool) -> None:
-    """Compare the devices of two EDS files; exit status 1 if they differ.
+    """Compare the devices of two EDS files. The exit status is 1 if they differ.
 
-    It compares objects, entries and their fields, identity and bit rates, not the text. - marks
-    items only in the first file, + only in the second, ~ differences.
+    The command compares objects, entries and their fields, identity and bit rates, but not the
+    text. - marks items only in the first file, + marks items only in the second file, ~ marks
+    differences.
 
     \b
     canmon eds diff old.eds new.eds

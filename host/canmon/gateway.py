@@ -43,9 +43,9 @@ def command(
 ) -> None:
     """Serve SOURCE to other programs in lines of text: CiA 309-3, ASCII mapping.
 
-    Commands come from standard input, or from clients of --listen or --socket,
-    such as CANopenNode's cocomm; each line has one answer. SOURCE is a bus, or a
-    rig file in virtual time. Every client that can connect can command all nodes.
+    Commands come from standard input, or from clients of --listen or --socket, such as
+    CANopenNode's cocomm. Each line has one answer. SOURCE is a bus, or a rig file in virtual time.
+    Every client that can connect can command all nodes.
 
     \b
     canmon gateway can0 --listen 60000

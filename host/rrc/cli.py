@@ -114,7 +114,7 @@ def main(context: click.Context, /, url: str, *, panel: bool, **guard: Any) -> N
 
     URL is a port: /dev/ttyACM0, COM3, rfc2217://HOST:PORT, socket://HOST:PORT. Nothing moves before
     an RRC has answered. Its watchdog and stablemode are on while the command runs. The command
-    always stops the motors before it ends; if it is killed, the watchdog stops VR2.
+    always stops the motors before it ends. If the command is killed, the watchdog stops VR2.
 
     \b
     rrc /dev/ttyACM0 status                  what is connected, and its state
@@ -195,9 +195,9 @@ def _status(**options: Any) -> None:
 def _drive(**options: Any) -> None:
     """Drive: V forward and W to the right, -100..100 % each.
 
-    On a terminal the chair drives while SPACE is held, or pressed again within 1 s; q ends. With
-    --pad it drives by the left stick while a button of the pad is held, with V and W as limits. A
-    script has neither and needs --for.
+    On a terminal, the chair drives while SPACE is held, or pressed again within 1 s. The key q ends
+    the command. With --pad, the chair drives by the left stick while a button of the pad is held,
+    with V and W as limits. A script has neither terminal nor pad, and needs --for.
 
     \b
     rrc /dev/ttyACM0 drive 30 0
@@ -228,7 +228,7 @@ def _drive(**options: Any) -> None:
 def _limit(**options: Any) -> None:
     """Drive by the stick: V % forward and W % of rotation at most.
 
-    It runs until Ctrl-C, and stops the chair then.
+    The command runs until Ctrl-C, and then stops the chair.
 
     \b
     rrc /dev/ttyACM0 limit 50 50
@@ -331,7 +331,7 @@ def _beep(**options: Any) -> None:
 @main.command("poweroff")
 @works_in(f"{_VERBS}:poweroff")
 def _poweroff(**options: Any) -> None:
-    """Force VR2 to stop; its power button must be pressed afterwards.
+    """Force VR2 to stop. Its power button must be pressed afterwards.
 
     \b
     rrc /dev/ttyACM0 poweroff
@@ -360,9 +360,9 @@ def _watch(**options: Any) -> None:
 def _test(**options: Any) -> None:
     """Run the test procedure of the manual, step by step.
 
-    It sends the sample commands without CHECK, then with CHECK, and checks the answers; you press
-    buttons, move the stick, and answer questions. Two samples run the motors: lift the wheels off
-    the ground first.
+    The command sends the sample commands without CHECK, then with CHECK, and checks the answers.
+    You press buttons, move the stick, and answer questions. Two samples run the motors, so lift the
+    wheels off the ground first.
 
     \b
     rrc /dev/ttyACM0 test

@@ -178,8 +178,8 @@ class SignalTrack:
         unit: unit of the values.
         source: source of the signal's name.
         count: number of values.
-        low, high: the least and the greatest value.
-        states: states of a signal whose values have names; None for a number.
+        low, high: least and greatest value.
+        states: states of a signal whose values have names, or None for a number.
     """
 
     unit: str = ""

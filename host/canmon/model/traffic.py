@@ -92,7 +92,7 @@ class GapRow(NamedTuple):
     Attributes:
         min_us: shortest gap.
         mean_us: mean of the gaps, rounded down.
-        p99_us: 99 % quantile. At most 1 % of the gaps were longer, and the value is at most one
+        p99_us: quantile of 99 %. At most 1 % of the gaps were longer, and the value is at most one
             part in 64 too long.
         max_us: longest gap.
         jitter_us: mean difference between a gap and the previous gap, rounded down.

@@ -67,9 +67,9 @@ def command(
 ) -> None:
     """Set up a CANopen network: find, address, configure and program its nodes.
 
-    SOURCE is a bus, or a rig file in virtual time. Instead -i and -c may name interface and channel
-    of a bus, as in python-can. Verbs that write ask first, or need --yes; they warn if a motor may
-    turn. In a rig they do not ask.
+    SOURCE is a bus, or a rig file in virtual time. Instead of SOURCE, -i and -c may name interface
+    and channel of a bus, as in python-can. Verbs that write ask first, or need --yes. They warn if
+    a motor may turn. In a rig, they do not ask.
 
     \b
     canmon net can0 scan                          which nodes are there?

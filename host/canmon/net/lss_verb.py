@@ -262,10 +262,10 @@ def command(  # noqa: PLR0913, PLR0917 - options
 ) -> None:
     """Configure node-ID and bit rate of nodes by LSS (CiA 305).
 
-    Without options it lists the nodes without a node-ID, by fastscan. Select the node by --identity
-    (1018h, as shown by `scan`), --fastscan, or --only-node. A node without a node-ID boots with its
-    new one at once, others at their next reset; without --store it is lost at power-off. In any
-    case all nodes are back in LSS waiting at the end.
+    Without options, the command lists the nodes without a node-ID, by fastscan. Select the node by
+    --identity (1018h, as shown by `scan`), --fastscan, or --only-node. A node without a node-ID
+    boots with its new node-ID at once. Other nodes use it after their next reset. Without --store,
+    the new node-ID is lost at power-off. In any case, all nodes are back in LSS waiting at the end.
 
     \b
     canmon net can0 lss                           who has no node-ID?

@@ -81,9 +81,9 @@ def scan(  # noqa: PLR0913, PLR0917 - options
     eds_folders: tuple[Path, ...],
     force: bool,
 ) -> None:
-    """List the nodes on the bus; exit status 1 if there are none.
+    """List the nodes on the bus. The exit status is 1 if there are none.
 
-    The device type (1000h) of each node-ID is read by SDO; nothing is changed. Nodes that only send
+    The device type (1000h) of each node-ID is read by SDO. Nothing is changed. Nodes that only send
     other frames are listed too. The state is known for nodes with a heartbeat.
 
     \b
@@ -92,10 +92,10 @@ def scan(  # noqa: PLR0913, PLR0917 - options
     canmon net can0 scan --write bus.yml --eds-dir eds
     canmon net can0 scan --workspace bench.toml --rules rules.toml
 
-    --write makes a bus.yml for `boot --bus` and `tickrig check`. It takes the EDS of each node, and
-    its name, from --eds-dir; a node without an EDS stands in it as a comment. --workspace makes
-    what `canmon tui -w` opens: the bus, and the EDS of each node. --rules makes what `canmon check
-    LOG FILE` holds: which nodes there are, their identities and their heartbeats (1017h).
+    --write makes a bus.yml for `boot --bus` and `tickrig check`. It takes the EDS and the name of
+    each node from --eds-dir. A node without an EDS is a comment in the file. --workspace makes a
+    file for `canmon tui -w` with the bus and the EDS of each node. --rules makes a file for `canmon
+    check LOG FILE` with the nodes, their identities and their heartbeats (1017h).
     """  # noqa: D301 - click wants the backspace
     paths = {"--write": bus_file, "--workspace": workspace, "--rules": rules}
     folder = _writing(paths, eds_folders, force=force)
@@ -333,9 +333,9 @@ _PERIODS: Final = 3
 def nmt(call: NetCall, word: str, node: str, dry_run: bool, yes: bool) -> None:
     """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
 
-    Then the command waits for the state, or after a reset for the boot-up; only a node with a
-    heartbeat (1017h) reports its state. Exit status 1 if it reports another one, does not boot, or
-    does not answer.
+    After sending, the command waits for the state, or after a reset for the boot-up. Only a node
+    with a heartbeat (1017h) reports its state. The exit status is 1 if the node reports another
+    state, does not boot, or does not answer.
 
     \b
     canmon net can0 nmt start 5
@@ -543,14 +543,15 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     start: bool,
     yes: bool,
 ) -> None:
-    """Boot NODE like an NMT master (CiA 302-2); exit status 1 if it does not boot.
+    """Boot NODE like an NMT master (CiA 302-2). The exit status is 1 if NODE does not boot.
 
-    Device type, identity, state, software, configuration, error control, in the order of Lely's
-    master; the error status is a letter A to O. The expectations come from --bus, for the master of
-    that bus.yml, or from --eds: its device, and for a DCF its values.
+    The steps are device type, identity, state, software, configuration and error control, in the
+    order of Lely's master. The error status is a letter A to O. The expectations come from
+    --bus, for the master of that bus.yml, or from --eds, which gives the device, and for a DCF the
+    values.
 
-    --explain sends only reads: it shows what the boot-up would write, in order, beside the value
-    that the node has now, and exits with 1 if the node would not boot.
+    --explain sends only reads. It shows what the boot-up would write, in order, beside the present
+    value of the node. The exit status is 1 if the node would not boot.
 
     \b
     canmon net can0 boot 5 --explain

@@ -60,11 +60,11 @@ _REFUSED: Final = 1
 def read(
     call: NetCall, node: int, names: Sequence[str], eds: Path | EdsFolder | None, as_json: bool
 ) -> None:
-    """Read objects of NODE, by name or index; without any all that its EDS names.
+    """Read objects of NODE, by name or index. Without an object, read all that its EDS names.
 
-    A name is that of the EDS in small letters with _ for other characters, such as
-    position_actual_value or identity_object.vendor_id, else that of CiA 301 or 402. Exit status 1
-    if the node refuses one.
+    A name is a name in the EDS in small letters with _ for other characters, such as
+    position_actual_value or identity_object.vendor_id, or else a name of CiA 301 or 402. The exit
+    status is 1 if the node refuses an object.
 
     \b
     canmon net can0 read 5 statusword 1018h:1 --eds drive.eds
@@ -135,7 +135,7 @@ def write(  # noqa: PLR0913, PLR0917 - options
 
     Values are decimal, hex (0x1F), in the unit of the object if its EDS has one, texts, or bytes in
     hex. If the type is unknown, write it before the value: u16:5. The command stops at the first
-    refused object; earlier ones stay written.
+    refused object. Earlier objects stay written.
 
     \b
     canmon net can0 write 5 heartbeat_time=100 --yes
@@ -198,11 +198,11 @@ _DIFFERENT: Final = 1
 @node_eds_option("EDS, DCF or XDD of both nodes.")
 @click.pass_obj
 def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) -> None:
-    """Compare NODE with a DCF, or with another node; exit status 1 if they differ.
+    """Compare NODE with a DCF, or with another node. The exit status is 1 if they differ.
 
-    A DCF is compared by its ParameterValues; a file without any, such as an EDS, by the defaults of
-    all parameters. For two nodes all parameters of the EDS are compared; values relative to the
-    node-ID are compared without it. Nothing is written.
+    A DCF is compared by its ParameterValues. A file without ParameterValues, such as an EDS, is
+    compared by the defaults of all parameters. For two nodes, all parameters of the EDS are
+    compared. Values relative to the node-ID are compared without it. Nothing is written.
 
     \b
     canmon net can0 compare 5 drive.dcf
@@ -393,7 +393,7 @@ def restore(  # noqa: PLR0913, PLR0917 - options
 ) -> None:
     """Restore the defaults of NODE (1011h): all, communication, application or a sub-index.
 
-    They take effect at its next reset.
+    The defaults take effect at the next reset of NODE.
 
     \b
     canmon net can0 restore 5 --reset
@@ -447,9 +447,9 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
 ) -> None:
     """Write the configuration of the DCF or XDC FILE to NODE, where it differs.
 
-    The configuration is its ParameterValues. PDOs are disabled while they change (CiA 301), and
-    1020h is written last. The command stops at the first refused object, and reports the written
-    ones. A file of another device (1000h, 1018h) is refused.
+    The configuration is the ParameterValues of FILE. PDOs are disabled while they change (CiA 301),
+    and 1020h is written last. The command stops at the first refused object, and reports the
+    written objects. A file of another device (1000h, 1018h) is refused.
 
     \b
     canmon net can0 dcf 5 drive.dcf --dry-run

@@ -115,11 +115,11 @@ def command(  # noqa: PLR0913, PLR0917 - options
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Download FILE to NODE by block transfer (CiA 302-3); without FILE show its program.
+    """Download FILE to NODE by block transfer (CiA 302-3). Without FILE, show its program.
 
-    Stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), identification (1F56h),
-    start. Finished steps are skipped, so the same command continues where it ended; an interrupted
-    transfer starts again, as CiA 301 requires. Lost blocks are sent again.
+    The steps are: stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), compare the
+    identification (1F56h), start. Finished steps are skipped, so the same command continues where
+    it ended. An interrupted transfer starts again, as CiA 301 requires. Lost blocks are sent again.
 
     \b
     canmon net can0 program 5

@@ -339,19 +339,19 @@ def command(  # noqa: PLR0913 - options
     strict: bool,
     **options: Any,
 ) -> None:
-    """Report what is wrong on a bus or in a log; exit status 1 if anything is.
+    """Report what is wrong on a bus or in a log. The exit status is 1 if there is a finding.
 
-    Without a rule, all rules that need no parameter are checked: they learn from
-    the frames what is usual. A bus is recorded until Ctrl-C, or for --for. Findings
-    are grouped by rule and node, each with its frames. The checked rules are
-    listed on standard error. Exit status 5 if nothing could be judged.
+    Without a rule, all rules that need no parameter are checked. They learn from the frames what is
+    usual. A bus is recorded until Ctrl-C, or for the time of --for. Findings are grouped by rule
+    and node, each with its frames. The checked rules are listed on standard error. The exit status
+    is 5 if nothing could be judged.
 
     --init learns what is usual in a good log: nodes, identities, CAN-IDs, lengths, periods, load,
-    order of boot-ups, EMCYs. Pass its file to the next check: canmon checks its rules and those
-    that need no parameter. Other rules need a check of their own.
+    order of boot-ups, EMCYs. Pass the resulting file to the next check. canmon then checks its
+    rules and the rules that need no parameter. Other rules need a check of their own.
 
-    With other rules, only these are checked. They are options, or a TOML file with the
-    same names: no_emcy = true, heartbeat = ["3=100ms±20%"].
+    With other rules, only these rules are checked. They are options, or a TOML file with the same
+    names: no_emcy = true, heartbeat = ["3=100ms±20%"].
 
     \b
     canmon check run.log

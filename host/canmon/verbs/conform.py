@@ -117,15 +117,14 @@ _reports: Final[Decorator] = add_options(
 def command(context: click.Context, /, source: str | None, **options: Any) -> None:
     """Test one CANopen node, clause by clause.
 
-    The node is a black box: only its frames on the bus count.
+    The node is a black box. Only its frames on the bus count.
 
-    SOURCE is a bus, or a rig file in virtual time. Alternatively -i and -c name
-    interface and channel of a bus, as in python-can; other options of a bus apply to
-    both. Without --node it lists the nodes that send. By default the node is
-    only read: --communication and --intrusive do more, restore what they changed,
-    and ask first (--yes). Objects 6000h to 9FFFh, which could move something,
-    are only written with --allow; exclude manufacturer objects that could, such as
-    a set pressure, with --never.
+    SOURCE is a bus, or a rig file in virtual time. Alternatively, -i and -c name interface and
+    channel of a bus, as in python-can. Other options of a bus apply in both cases. Without --node,
+    the command lists the nodes that send. By default, the node is only read. --communication and
+    --intrusive do more, restore what they changed, and ask first (--yes). Objects 6000h to 9FFFh,
+    which could move something, are only written with --allow. Use --never to exclude manufacturer
+    objects that could move something, such as a set pressure.
 
     \b
     canmon conform can0 --node 5 --eds drive.eds

@@ -173,9 +173,9 @@ def dump(  # noqa: PLR0913 - options
 ) -> None:
     """Show frames as they come, and what they mean.
 
-    It only listens. Frames are decoded by the CANopen standard, by --eds and
-    --dbc, and by the SDO traffic on the bus. Frames go to standard output;
-    lost and invalid frames are reported on standard error.
+    The command only listens. Frames are decoded by the CANopen standard, by --eds and --dbc, and by
+    the SDO traffic on the bus. Frames go to standard output. Lost and invalid frames are reported
+    on standard error.
 
     \b
     canmon dump can0 -t z
@@ -188,9 +188,9 @@ def dump(  # noqa: PLR0913 - options
     canmon dump run.log --from 2.5 --to 3 -t a
     ssh robot canmon dump can0 --jsonl | canmon top -
 
-    A recording in parts has an index, such as run.index.jsonl; the same command
-    continues it. One that waits for a trigger also accepts Enter and SIGUSR1. A recording waits for
-    a bus that goes away.
+    A recording in parts has an index, such as run.index.jsonl. The same command continues the
+    recording. A recording that waits for a trigger also accepts Enter and SIGUSR1. A recording
+    waits for a bus that goes away.
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -346,10 +346,10 @@ def conv(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     strict: bool,
 ) -> None:
-    """Write what SOURCE holds into the file LOG; its name says the format.
+    """Write what SOURCE holds into the file LOG. Its name says the format.
 
-    Several files are merged by time. What a format cannot hold is reported on
-    standard error. From files, LOG is written completely or not at all.
+    Several files are merged by time. Items that a format cannot hold are reported on standard
+    error. From files, LOG is written completely or not at all.
 
     \b
     canmon conv a.blf b.log

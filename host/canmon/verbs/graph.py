@@ -176,15 +176,15 @@ _NO_TERMINAL: Final = (100, 28)
 @bus_options
 @fd_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
-    """Draw curves of SOURCE: in the terminal, or to files; without SIGNAL, list what there is.
+    """Draw curves of SOURCE: in the terminal, or to files. Without SIGNAL, list all signals.
 
-    A SIGNAL is an object, as 3.velocity_actual_value or 3.statusword.fault
-    (names from the EDS or DBC file, or from SDO traffic), or a slice, such as
-    ID[BYTES]TYPE*FACTOR+OFFSET: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5; TYPE
-    is u, s or f, with the suffix b big-endian. The prefix LABEL= names it, the suffix @2 puts it on
-    another axis. A spike never vanishes: each column shows its smallest and
-    largest value. load, nmt, emcy, sdo and 'sync jitter' are curves
-    or states of the bus and its nodes, as 3.nmt; a statusword is its states.
+    A SIGNAL is an object, such as 3.velocity_actual_value or 3.statusword.fault (names from the EDS
+    or DBC file, or from SDO traffic), or a slice, such as ID[BYTES]TYPE*FACTOR+OFFSET. BYTES is 2,
+    2:6, bit 2.3 or bits 2.3+5. TYPE is u, s or f, with the suffix b for big-endian. The prefix
+    LABEL= names the curve, and the suffix @2 puts it on another axis. A spike never vanishes,
+    because each column shows its smallest and largest value. load, nmt, emcy, sdo and 'sync jitter'
+    are curves or states of the bus and its nodes, such as 3.nmt. A statusword is shown as its
+    states.
 
     \b
     canmon graph run.log --eds 3=drive.eds
@@ -193,7 +193,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     canmon graph run.blf 'speed=181[2:6]s*0.001' '281[0:2]@2' -o g.svg -o g.csv
     canmon graph can0 3.velocity_actual_value --eds 3=drive.eds --window 5s
 
-    A bus is drawn live; q or Ctrl-C ends that.
+    A bus is drawn live, until q or Ctrl-C.
 
     {source}
     """  # noqa: D301 - click wants the backspace

@@ -111,8 +111,8 @@ def _last_us(path: Path) -> int | None:
 def command(log: Sequence[Path], jsonl: bool) -> None:
     """Show what log files hold: format, size, buses, first and last time.
 
-    Only the beginning of a file is read, and the end of a text file.
-    `canmon stats` reads all of it.
+    Only the beginning of a file is read, and the end of a text file. `canmon stats` reads the whole
+    file.
 
     \b
     canmon info run.log run.blf

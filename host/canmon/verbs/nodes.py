@@ -61,9 +61,9 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Show all nodes: NMT state, heartbeat, boot-ups, drive state, EMCYs, SDO errors.
 
-    It listens only, and knows what it hears: the heartbeat period by SDO
-    traffic or an EDS, else learnt (~). An arrow shows a state that was
-    commanded and is not confirmed yet. Of a log file it shows the final state.
+    The command only listens. It shows the heartbeat period from SDO traffic or an EDS, or else the
+    period that it learns from the heartbeats (marked ~). An arrow shows a state that was commanded
+    and is not confirmed yet. For a log file, the command shows the final state.
 
     \b
     canmon nodes can0

@@ -205,9 +205,9 @@ def _log_path(word: str) -> Path:
 def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     """Send the frames of LOG again, with the gaps that were recorded.
 
-    BUS takes all of it, BUS=RECORDED what was recorded on one bus; the frames
-    of others are left out. Without a BUS that of -c takes all of it. Error
-    frames are not sent. At the end it says how late the frames went out.
+    BUS takes all recorded frames. BUS=RECORDED takes the frames that were recorded on one bus, and
+    the frames of other buses are left out. Without a BUS, the bus of -c takes all frames. Error
+    frames are not sent. At the end, the command reports how late the frames were sent.
 
     \b
     canmon play run.log vcan0

@@ -82,10 +82,10 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Write the traffic of a bus as one self-contained HTML page.
 
-    The page has a summary, the findings of the rules with the frames around
-    them, a timeline with a lane for each node and signal, the nodes and the
-    CAN-IDs. It loads nothing from a network, so you can mail it. Names of
-    signals come from --eds, --dbc or SDO traffic; a load in percent needs -b.
+    The page has a summary, the findings of the rules with the frames around them, a timeline with a
+    lane for each node and signal, the nodes and the CAN-IDs. It loads nothing from a network, so
+    you can mail it. Names of signals come from --eds, --dbc or SDO traffic. A load in percent needs
+    -b.
 
     \b
     canmon report run.log -o run.html
@@ -94,8 +94,8 @@ def command(  # noqa: PLR0913 - options
     canmon report run.log --from 2.5 --to 30 -o part.html
     canmon report can0 --for 60s -o bus.html --pdf bus.pdf
 
-    A bus is recorded first, until Ctrl-C or for --for. The log is checked against the rules of a
-    file that canmon check --init wrote, such as good.toml.
+    A bus is recorded first, until Ctrl-C or for the time of --for. The log is checked against the
+    rules of a file that canmon check --init wrote, such as good.toml.
 
     {source}
     """  # noqa: D301 - click wants the backspace

@@ -44,16 +44,16 @@ else:  # python-can is slow
 @bus_options
 @fd_options
 def command(words: Sequence[str], eds: EdsOptions, **options: Any) -> None:
-    """Send frames on BUS: by bytes as 123#DEADBEEF, or a PDO by the names of its objects.
+    """Send frames on BUS: by bytes such as 123#DEADBEEF, or a PDO by the names of its objects.
 
-    Without a BUS they go to that of -c. 123##1AABB is a CAN FD frame; the
-    digit is 1 for BRS, 2 for ESI, 3 for both. SocketCAN takes it as it is,
-    other drivers want --fd.
+    Without a BUS, the frames go to the bus of -c. 123##1AABB is a CAN FD frame, in which the digit
+    is 1 for BRS, 2 for ESI, 3 for both. SocketCAN accepts it without an option, other drivers need
+    --fd.
 
-    Objects that are not named have the value of the EDS, else 0. What is sent
-    is printed as candump logs it. Bits of a byte are counted with
-    0.4+4:0..14. Checksums: xor, sum8, neg8, crc8 (SAE J1850), crc8-2f
-    (AUTOSAR), crc8-07 (SMBus), over all other bytes or those of 7:crc8:1..6.
+    Objects that are not named have the value of the EDS, or else 0. Sent frames are printed as
+    candump logs them. Bits of a byte are counted with 0.4+4:0..14. Checksums are xor, sum8, neg8,
+    crc8 (SAE J1850), crc8-2f (AUTOSAR) and crc8-07 (SMBus), over all other bytes or over the bytes
+    of 7:crc8:1..6.
 
     \b
     canmon send can0 123#DEADBEEF 00000605#40 705#R

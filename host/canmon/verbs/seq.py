@@ -76,11 +76,10 @@ _FAILED: Final = 1
 @bus_options
 @click.pass_context
 def command(context: click.Context, /, words: Sequence[str], **options: Any) -> None:
-    """Run the sequence FILE on BUS; exit status 1 if an expectation was missed.
+    """Run the sequence FILE on BUS. The exit status is 1 if an expectation was missed.
 
-    Without a BUS, -c names it. A TOML file has steps that send, wait, expect and
-    repeat; any other file has lines such as '+10 123#DEADBEEF': 10 ms after the
-    line above.
+    Without a BUS, -c names the bus. A TOML file has steps that send, wait, expect and repeat. Any
+    other file has lines such as '+10 123#DEADBEEF', which sends a frame 10 ms after the line above.
 
     \b
     [vars]

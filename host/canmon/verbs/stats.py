@@ -223,10 +223,10 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Count a log: rates, gaps, jitter, missed cycles, exact load, error frames.
 
-    Gaps are of all frames; p99 is at most 1/64 too long. A cycle is shown if
-    most gaps are near the median; missed counts its missing frames.
-    Jitter is the average difference between successive gaps. Loads
-    count stuff bits and are a share of the bit rate that -b gives.
+    Gaps are those of all frames. p99 is at most 1/64 too long. A cycle is shown if most gaps are
+    near the median. "missed" counts the missing frames of the cycle. Jitter is the average
+    difference between successive gaps. Loads count stuff bits and are a share of the bit rate that
+    -b gives.
 
     \b
     canmon stats run.log -b 500000

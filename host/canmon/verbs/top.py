@@ -47,9 +47,8 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Show all identifiers: counts, rates, gaps, jitter, missed cycles, changes, load.
 
-    It listens only. Ten times a second the screen is painted; the last table
-    stays in the terminal. A log file is read at once. The load is a share of
-    the bit rate that -b gives.
+    The command only listens. The screen is updated ten times a second, and the last table stays in
+    the terminal. A log file is read at once. The load is a share of the bit rate that -b gives.
 
     \b
     canmon top can0 -b 500000

@@ -48,10 +48,9 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Show all there is in tabs: trace, nodes, statistics and more (extra tickrig[tui]).
 
-    Without a SOURCE the settings (F2) ask for one.
-    It listens only, until it is armed (A). With -w all settings are recalled
-    from a TOML file and kept there, buses and EDS files with them; what the
-    command line says goes before.
+    Without a SOURCE, the settings (F2) ask for one. The monitor only listens until it is armed (A).
+    With -w, all settings are loaded from a TOML file and stored there, including buses and EDS
+    files. The command line takes precedence over this file.
 
     \b
     canmon tui can0 -b 500000

@@ -240,16 +240,18 @@ class ServedNode:
         server: server of the node.
 
     Attributes:
-        entry, file, writes: as given.
-        phase: the phase of its set-up.
-        received_us: time of its last frame.
-        lost: whether its heartbeat is late.
-        problem: the reason why it is refused, as text.
-        layouts: its PDOs.
-        to_start: whether it is to be activated in the start order.
-        dialogue: the dialogue with the node.
-        operations: its proxy, and its NMT state.
-        due_us: when to call `tick` next.
+        entry: entry of the node in the System Definition.
+        file: content of the node's EDS.
+        writes: values that are written while the node boots.
+        phase: phase of the set-up of the node.
+        received_us: time of the last frame of the node.
+        lost: whether the heartbeat of the node is late.
+        problem: reason why the node is refused, as text.
+        layouts: layouts of the node's PDOs.
+        to_start: whether the node will be activated in the start order.
+        dialogue: dialogue with the node.
+        operations: proxy of the node, and its NMT state.
+        due_us: time of the next call of `tick`.
     """
 
     def __init__(

@@ -16,8 +16,8 @@ from tickrig.host.rtc.commands.verbs import SYSTEM_VERBS, VERBS, conf
 def rtc() -> None:
     """Run RT components, and work with them while they run, in the manner of rtshell.
 
-    Components are named ConsoleIn0 or localhost/ConsoleIn0.rtc, ports
-    ConsoleIn0.out or localhost/ConsoleIn0.rtc:out.
+    Components are named ConsoleIn0 or localhost/ConsoleIn0.rtc. Ports are named ConsoleIn0.out or
+    localhost/ConsoleIn0.rtc:out.
 
     \b
     tickrig rtc run system.toml                      in one terminal
@@ -28,8 +28,8 @@ def rtc() -> None:
     tickrig rtc inject ConsoleOut0.in 5
     tickrig rtc edit                                 all of it on the screen
 
-    Exit status 0; 1 where a component did not get to the state that was asked
-    for, and where check found something; 2 with one line where something was refused.
+    The exit status is 0 for success. It is 1 if a component did not reach the requested state, or
+    if check found a difference. It is 2, with a message of one line, if a request was refused.
     """  # noqa: D301 - click wants the backspace
 
 
@@ -75,13 +75,12 @@ def rtc() -> None:
 def run(**options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
-    SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
-    System Editor write it; without it there is no component at first. What
-    arrives at a ConsoleOut is printed.
+    SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT System Editor write it.
+    Without SYSTEM, there is no component at first. Values that arrive at a ConsoleOut are printed.
 
-    Types: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample, RefHardRh3,
-    Odometry, PositionInput, OmniTo2WD, Navigation, PathFollower and others; an
-    unknown type is refused with a list of all.
+    Types are ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample, RefHardRh3, Odometry,
+    PositionInput, OmniTo2WD, Navigation, PathFollower and others. An unknown type is refused with a
+    list of all types.
 
     \b
     tickrig rtc run system.toml

@@ -143,7 +143,7 @@ def conf() -> None:
 @click.option("-l", "--long", is_flag=True, help="Show the values of each set.")
 @at
 def list_(at: Path, name: str, long: bool) -> None:
-    """List the parameters of the component NAME with the values that hold, and its sets.
+    """List the parameters of the component NAME with their present values, and its sets.
 
     \b
     tickrig rtc conf list ConfigSample0 -l
@@ -157,7 +157,7 @@ def list_(at: Path, name: str, long: bool) -> None:
 @click.argument("parameter")
 @at
 def get(at: Path, name: str, parameter: str) -> None:
-    """Print the value of PARAMETER that holds.
+    """Print the present value of PARAMETER.
 
     \b
     tickrig rtc conf get ConfigSample0 int_param0
@@ -175,7 +175,7 @@ def get(at: Path, name: str, parameter: str) -> None:
 @click.option("--set", "set_id", default="", help="The set to change.  [the active one]")
 @at
 def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
-    """Change PARAMETER to VALUE; elements of a list have commas between.
+    """Change PARAMETER to VALUE. Separate the elements of a list by commas.
 
     \b
     tickrig rtc conf set ConfigSample0 int_param0 5
@@ -188,7 +188,7 @@ def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
 @click.argument("set_id", metavar="SET")
 @at
 def act(at: Path, name: str, set_id: str) -> None:
-    """Let the values of SET hold.
+    """Activate the configuration set SET.
 
     \b
     tickrig rtc conf act ConfigSample0 fast
@@ -216,9 +216,9 @@ _names_needed = click.argument("names", nargs=-1, required=True, shell_complete=
 @as_json
 @at
 def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: bool) -> None:
-    """List the components NAMES, all if none is named.
+    """List the components NAMES, or all components if none is named.
 
-    With -l a line is: state, ports/those connected, rate, type, name.
+    With -l, a line contains state, number of ports/connected ports, rate, type and name.
 
     \b
     tickrig rtc ls -l
@@ -278,7 +278,7 @@ def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
 def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: str) -> None:
     """Connect the ports FIRST and SECOND.
 
-    Keys of properties stand with or without `dataport.` before them.
+    Keys of properties may have `dataport.` before them, or not.
 
     \b
     tickrig rtc con ConsoleIn0.out ConsoleOut0.in
@@ -292,7 +292,7 @@ def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: st
 @click.argument("ports", nargs=-1, required=True, shell_complete=complete_port)
 @at
 def dis(at: Path, ports: tuple[str, ...]) -> None:
-    """End the connector between two PORTS, all of one port, or all of a component.
+    """End the connector between two PORTS, or all connectors of one port or of a component.
 
     \b
     tickrig rtc dis ConsoleIn0.out ConsoleOut0.in
@@ -321,8 +321,8 @@ def exit_(at: Path, names: tuple[str, ...]) -> None:
 def inject(at: Path, port: str, value: str) -> None:
     """Write VALUE to the InPort PORT, as an OutPort connected with it would.
 
-    VALUE is JSON, and nothing else: the data of a value with a time, or a whole
-    struct. Octets are lists of numbers, enumerators names.
+    VALUE is JSON, and nothing else. It is the data of a value with a time, or a whole struct.
+    Octets are lists of numbers, and enumerators are names.
 
     \b
     tickrig rtc inject ConsoleOut0.in -5
@@ -344,7 +344,7 @@ def inject(at: Path, port: str, value: str) -> None:
 @click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a value.")
 @at
 def print_(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
-    """Print what the OutPort PORT writes from now on, a line a value; Ctrl-C ends.
+    """Print what the OutPort PORT writes from now on, one value per line, until Ctrl-C.
 
     A line is the value's time in seconds and its data as JSON.
 
@@ -428,7 +428,7 @@ _FILES: Final = "tickrig.host.rtc.system.system_file"
 @click.argument("file", type=PATH, required=False)
 @at
 def save(at: Path, file: Path | None) -> None:
-    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML.
+    """Write the present system to FILE, .toml or .xml. Without FILE, print it as TOML.
 
     \b
     tickrig rtc save system.toml
@@ -445,7 +445,7 @@ def save(at: Path, file: Path | None) -> None:
 @as_json
 @at
 def status(at: Path, as_json: bool) -> None:
-    """Show how the run is going: time, late ticks.
+    """Show the state of the run: time and late ticks.
 
     \b
     tickrig rtc status --json
@@ -473,10 +473,12 @@ def stop(at: Path) -> None:
 @click.argument("file", type=PATH)
 @at
 def check(at: Path, file: Path) -> None:
-    """Compare the system with FILE, .toml or .xml: exit status 1 and a line for all it lacks.
+    """Compare the system with FILE, .toml or .xml.
 
-    States are compared with a .toml file; RTSProfile has none. What is there
-    beside it does not matter.
+    Print a line for each part that the system lacks.
+
+    The exit status is 1 if the system lacks a part. States are compared with a .toml file, because
+    RTSProfile has none. Additional parts of the system do not matter.
 
     \b
     tickrig rtc check system.toml
@@ -505,9 +507,9 @@ def dot(at: Path) -> None:
 def edit(at: Path) -> None:
     """Show the system as a picture on the terminal, and change it (extra tickrig[tui]).
 
-    Boxes with ports, a wire for each connector. Arrows go from port to port; a, d, r
-    activate, deactivate, reset; m marks a port, c connects it, x disconnects; Tab goes to
-    the configuration, e edits it. F1 shows the keys.
+    The picture has boxes with ports, and a wire for each connector. Arrows move from port to port.
+    The keys a, d and r activate, deactivate and reset. The key m marks a port, c connects it, x
+    disconnects. Tab goes to the configuration, and e edits it. F1 shows the keys.
 
     \b
     tickrig rtc edit

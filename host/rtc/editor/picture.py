@@ -258,7 +258,7 @@ class _End:
     """One end of a wire.
 
     Attributes:
-        row, column: position of its box in the grid.
+        row, column: position of the box of the end in the grid.
         line: line of the port, counted from the first line of the box.
         channel: the channel at the side of the port.
     """

@@ -90,7 +90,7 @@ class Rows:
     """Columns in which some frames are still unknown.
 
     Attributes:
-        at_us, ident, dlc, payload, sent, channel: as in `Columns`; 0 in unknown rows.
+        at_us, ident, dlc, payload, sent, channel: columns as in `Columns`, with 0 in unknown rows.
         known: whether each row holds a frame.
     """
 

@@ -27,9 +27,9 @@ def main(
 ) -> None:
     """Serve a System Definition, and show and change it while it runs (extra tickrig[tui]).
 
-    The same server as rtc-canopen-server, on a terminal: nodes and proxies, their
-    objects with live read and write, connections through the PC and PDO links.
-    What is changed is saved on demand only. F1 shows the keys.
+    The editor is the same server as rtc-canopen-server, on a terminal. It shows nodes and proxies,
+    their objects with live read and write, connections through the PC, and PDO links. Changes are
+    saved only on demand. F1 shows the keys.
 
     \b
     rtc-canopen-editor robot.yaml

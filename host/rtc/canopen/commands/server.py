@@ -41,10 +41,10 @@ component_option: Final[Decorator] = click.option(
 def main(file: Path, span: str | None, **options: Any) -> None:
     """Manage the CANopen nodes of a System Definition as RT components.
 
-    FILE is YAML or JSON. The bus is that of FILE unless -i and -c name another.
-    The server is NMT master and heartbeat consumer: it sets the nodes up, makes
-    a proxy of each, links their PDOs and connects their ports, and sees nodes
-    come and go. At Ctrl-C it resets their communication.
+    FILE is YAML or JSON. The bus is that of FILE unless -i and -c name another bus. The server is
+    NMT master and heartbeat consumer. It sets up the nodes, makes a proxy of each node, links their
+    PDOs and connects their ports, and detects when nodes come and go. At Ctrl-C, the server resets
+    the communication of the nodes.
 
     \b
     rtc-canopen-server robot.yaml
