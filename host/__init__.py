@@ -1,4 +1,4 @@
-"""Host-side proxies and monitors; they work in the same way with hardware and emulators."""
+"""Host-side proxies and monitors, which work in the same way with hardware and emulators."""
 
 from tickrig._lazy import lazy
 

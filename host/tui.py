@@ -355,7 +355,9 @@ _HARMLESS: Final = _Harmless()
 
 
 class FramedApp(App[None]):
-    """F1 shows and hides help, Escape hides help; q, Ctrl-Q, Ctrl-C and signals end the app.
+    """A framed app, in which F1 shows and hides help, and Escape hides help.
+
+    The keys q, Ctrl-Q and Ctrl-C, and signals, end the app.
 
     Ctrl-Q and Ctrl-C work everywhere, also while a question is on the screen. The app also ends if
     the terminal is gone.

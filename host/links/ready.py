@@ -1,4 +1,4 @@
-"""Waits for any number of descriptors, because `select` supports only descriptors below 1024.
+"""Waiting for any number of descriptors, because `select` supports only descriptors below 1024.
 
 >>> import os
 >>> reader, writer = os.pipe()

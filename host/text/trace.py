@@ -12,7 +12,7 @@ Each line has the time of the device's tick in seconds, a mark and a text. The m
 - `>` is traffic to the device, `<` is traffic from the device. Bytes are written by
   `byte_text.escape`.
 - `!` is a physical input that changed before the tick.
-- `.` is the duration of the run; it is the last line.
+- `.` is the duration of the run, which is the last line.
 """
 
 from __future__ import annotations

@@ -1,1 +1,4 @@
-"""A monitor of a CAN bus: frames in, rows out; pure, with the time of its frames."""
+"""A monitor of a CAN bus, with frames as input and rows as output.
+
+It uses the time of the frames.
+"""

@@ -52,7 +52,7 @@ ALGORITHMS: Final[Mapping[str, Callable[[bytes], int]]] = {
 """Checksums by name.
 
 `neg8` makes the sum of all bytes 0. The CRCs are SAE J1850, AUTOSAR 8H2F and SMBus. The first two
-have the initial value 0xFF; crcmod requires this value after the final xor.
+have the initial value 0xFF, because crcmod requires this value after the final xor.
 """
 
 

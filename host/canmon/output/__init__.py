@@ -1,1 +1,1 @@
-"""How verbs print, paint, send and end; not what a frame means."""
+"""Printing, screens, sending and ending of verbs, but not the meaning of frames."""

@@ -1,1 +1,1 @@
-"""Where frames come from: buses, log files, pipes, serial ports."""
+"""Sources of frames: buses, log files, pipes, serial ports."""

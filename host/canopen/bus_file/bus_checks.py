@@ -29,10 +29,16 @@ _CLASSES: Final = {
     "Cia402Driver": "canopen_402_driver",
     "BaseDriver": "canopen_base_driver",
 }
-"""The packages of the ros2_canopen classes; each also has a lifecycle variant of its class."""
+"""Packages of the ros2_canopen driver classes.
+
+Each package also has a lifecycle variant of its class.
+"""
 _MISSING: Final = ("object-missing", "pdo-missing")
 _MOST_OFF: Final = 0.01
-"""The largest relative error of a scale and its inverse; files give both rounded."""
+"""The largest relative error between a scale and its inverse.
+
+Files contain rounded values of both.
+"""
 
 
 STOPS: Final = frozenset(
@@ -43,7 +49,7 @@ STOPS: Final = frozenset(
         *("truncated", "utf-16", "xml"),
     )
 )
-"""Rules for EDS files; dcfgen stops if one of them is broken."""
+"""Rules for EDS files that dcfgen needs. dcfgen stops if an EDS breaks one of these rules."""
 
 
 def check_node_ids(
@@ -91,17 +97,20 @@ def check_cob_ids(
 
 
 def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
-    """Return whether two nodes share a node-ID, which is reported, and thus all CAN-IDs."""
+    """Return whether two nodes share a node-ID, and thus all CAN-IDs.
+
+    Such nodes are already reported.
+    """
     return one is not None and one is not other and one.node_id == other.node_id
 
 
 def _final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
-    """Return the place of the last write to an entry, by index << 8 | sub-index."""
+    """Return the place of the last write to each entry. The key is index << 8 | sub-index."""
     return {write.index << 8 | write.sub_index: write.place for write in writes}
 
 
 def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
-    """Yield the enabled PDOs with 11-bit CAN-IDs, TPDOs first: name, CAN-ID, place, slave."""
+    """Yield name, CAN-ID, place and slave of enabled PDOs with 11-bit CAN-IDs, TPDOs first."""
     for transmit in (True, False):
         for slave in slaves.values():
             places = _final_places(slave.writes)
@@ -124,7 +133,7 @@ def has_drivers(layout: Layout) -> bool:
 
 
 def check_container(notes: BusFileNotes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
-    """Report what the ros2_canopen container refuses, if the file is for it."""
+    """Report settings that the ros2_canopen container refuses, if the container reads the file."""
     if not has_drivers(layout):
         return
     unmade = layout.slaves.keys() - slaves.keys()
@@ -168,7 +177,7 @@ def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
 
 
 def _check_class(section: BusFileSection) -> None:
-    """Report a class that ros2_canopen does not have, or not in this package."""
+    """Report a driver class that ros2_canopen does not have, or that its package does not have."""
     if not (set(_DRIVER_KEYS) <= section.fields.keys()):
         return
     named, package = (section.text(key) for key in _DRIVER_KEYS)
@@ -210,7 +219,7 @@ def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]
 
 
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
-    """Return how many findings `canmon eds check` has in each EDS, and which stop dcfgen."""
+    """Report the number of `canmon eds check` findings per EDS, and which of them stop dcfgen."""
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
         found, is_unicode = _findings_of(str(sheet), read_eds_bytes(sheet))

@@ -254,7 +254,7 @@ def read_bus_file(path: Path) -> BusFile:
 
     Raises:
         OSError: the file cannot be read.
-        ImportError: PyYAML is not installed; the message says how to install it.
+        ImportError: PyYAML is not installed. The message contains the way to install it.
     """
     with path.open("rb") as file:
         return decode_bus_file(file.read(_MOST_BYTES + 1), path)

@@ -161,7 +161,7 @@ class NodeFound:
             node does not have.
         name: device name (object 1008h), empty if the node has none.
         state: last reported NMT state, or None if the node reported none.
-        answers: number of answers to one question; 2 means that two nodes share this node-ID.
+        answers: number of answers to one question. 2 means that two nodes share this node-ID.
         heartbeat_ms: producer heartbeat time (object 1017h), or None if the node has none.
     """
 

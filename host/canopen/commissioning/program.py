@@ -141,7 +141,7 @@ class ProgramFailed(Exception):  # noqa: N818 - what the node did
 
 @dataclass(frozen=True, slots=True)
 class ProgramStatus:
-    """What a node reports about a program.
+    """The status of a program, as a node reports it.
 
     Attributes:
         control: value of program control (object 1F51h).

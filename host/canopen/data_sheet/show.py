@@ -232,7 +232,7 @@ def _device(one: Document, other: Document) -> Iterator[_Change]:
 
 
 def _number(document: Document, key: str) -> str:
-    """Return a number of [DeviceInfo] in one notation; 0 counts as missing."""
+    """Return a number of [DeviceInfo] in one notation. 0 counts as missing."""
     text = plain_numbers(document.file.value("DeviceInfo", key))
     try:
         number = parse_number(text or "0")

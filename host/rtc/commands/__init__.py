@@ -1,1 +1,1 @@
-"""The command `tickrig rtc`, and what can be asked of a running system; the model is beside it."""
+"""The command `tickrig rtc`, and the requests to a running system. The model is a separate part."""

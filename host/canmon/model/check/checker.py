@@ -479,7 +479,7 @@ class Alarms:
     _lost: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
-        """Begin with all rules unbroken."""
+        """Start with all rules unbroken."""
         self.clear()
 
     def clear(self) -> None:

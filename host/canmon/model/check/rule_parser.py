@@ -306,7 +306,7 @@ def _time_us(text: str) -> int | None:
 
 
 def _tolerance_us(text: str, period_us: int) -> int | None:
-    """Parse a percentage of a period, or a time; return None if the text is neither.
+    """Parse a percentage of a period, or a time. Return None if the text is neither.
 
     >>> _tolerance_us("10%", 10_000), _tolerance_us("250us", 10_000)
     (1000, 250)

@@ -45,7 +45,7 @@ class Rules:
         heartbeats: limits of the heartbeat times of some nodes.
         nodes: nodes that must be present.
         max_gaps: identifiers and the longest allowed gap of each, in microseconds.
-        known: all allowed identifiers, or None for any.
+        known: all allowed identifiers, or None to allow any identifier.
         others: factories of further rules from installed packages.
         expressions: rules about decoded frames. `Checker` checks them if it gets decoded frames.
             The block-wise check does not support them.

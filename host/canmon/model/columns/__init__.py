@@ -1,1 +1,1 @@
-"""The same for whole logs at once, in columns; needs numpy, and only here."""
+"""The same functions for whole logs at once, in columns. Only this package needs numpy."""

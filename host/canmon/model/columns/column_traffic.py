@@ -59,7 +59,7 @@ def column_bits(
     Args:
         ident: identifiers as `ident_of` returns them.
         dlc: data length codes, also of remote frames.
-        payload: data bytes as a little-endian number; missing bytes are 0.
+        payload: data bytes as a little-endian number. Missing bytes are 0.
     """
     out = np.empty(len(ident), np.int64)
     for begin in range(0, len(ident), _BLOCK):

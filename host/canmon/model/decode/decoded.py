@@ -63,7 +63,7 @@ class Transfer:
         flaws: inconsistencies such as a gap, a size or a CRC.
         sized: whether the number of bytes is indicated. An expedited transfer without it has four
             bytes.
-        length: text about an unusual length; empty if the length is usual.
+        length: text about an unusual length, empty if the length is usual.
         name: name of the object, empty if unknown.
         value: value of the bytes. For an unknown type, up to 8 bytes are a number.
         text: the value as text.
@@ -168,8 +168,8 @@ class Decoded(NamedTuple):
 
     Attributes:
         kind: kind of the frame: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1..,
-            rpdo1.., lss, dbc, error, rrc, rtc-lite; unmapped for a PDO without a description, fd
-            for a CAN FD frame, raw for all others.
+            rpdo1.., lss, dbc, error, rrc, rtc-lite, unmapped for a PDO without a description, fd
+            for a CAN FD frame, or raw for all others.
         node: node of the object, or None if there is none.
         summary: one line of text, or None if transfers or signals contain all information.
         signals: values in the frame.

@@ -119,7 +119,7 @@ class ScreenClock:
         return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > _LATE_US)
 
     def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
-        """Return the time of a stamp; without a stamp, the time of the previous frame.
+        """Return the time of a stamp, or the time of the previous frame without a stamp.
 
         Raises:
             ValueError: the date does not exist.

@@ -141,14 +141,14 @@ def _value(text: str) -> float | str:
 
 
 class Client(Protocol):
-    """Reads and writes objects of the node under test."""
+    """A client that reads and writes objects of the node under test."""
 
     def upload(self, index: int, sub: int, /) -> bytes:
-        """Read an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        """Read an object. Raises SdoAborted, SdoMisnamed and SdoTimeout."""
         ...
 
     def download(self, index: int, sub: int, data: bytes, /) -> None:
-        """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        """Write an object. Raises SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
 def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> None:

@@ -239,7 +239,7 @@ class ObjectsPane(CursorView[Entry]):
         self.objects = self._of.get(node_id)
 
     def look(self, view: ServerView) -> None:
-        """Read the visible objects; the server waits during this time."""
+        """Read the visible objects. The server waits during this time."""
         if (objects := self.objects) is None:
             self.title = "objects"
             return
