@@ -157,7 +157,7 @@ Send = Callable[[int, bytes], None]
 def nothing(*_: object) -> None:
     """Do nothing.
 
-    This is used if the host guards no node, or if no caller needs a script's result.
+    The script is used if the host guards no node, or if no caller needs a script's result.
     """
 
 

@@ -8,8 +8,8 @@ The module reads lines that a client of a gateway sends (CiA 309-3, syntax of co
 >>> parse_request("# nothing") is None
 True
 
-It also converts the data types of a gateway, which a client writes for the bytes of an object (CiA
-309-3).
+The module also converts the data types of a gateway, which a client writes for the bytes of an
+object (CiA 309-3).
 
 >>> encode("i16", ["-2"]).hex(), decode("i16", b"\xfe\xff"), decode("x16", b"\x92\x01")
 ('feff', '-2', '0x0192')

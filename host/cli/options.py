@@ -127,7 +127,7 @@ def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 def time_option(option: str, name: str, **attributes: Any) -> Decorator:
     """Return an option for a time such as `10s`.
 
-    Its value is in microseconds, or None by default.
+    The value of the option is in microseconds, or None by default.
     """
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:

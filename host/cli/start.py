@@ -172,7 +172,7 @@ def paint(stream: TextIO, text: str) -> None:
 def write_harmless(stream: TextIO, text: str) -> None:
     """Write text that is known to have no control characters.
 
-    This is faster, because the characters are not checked.
+    This method is faster than `write`, because the characters are not checked.
     """
     if isinstance(stream, _HarmlessStream):
         io.TextIOWrapper.write(stream, text)

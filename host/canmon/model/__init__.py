@@ -1,4 +1,4 @@
 """A monitor of a CAN bus, with frames as input and rows as output.
 
-It uses the time of the frames.
+The monitor uses the time of the frames.
 """

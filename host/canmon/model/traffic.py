@@ -12,7 +12,7 @@ The module counts the times between frames of one identifier.
 >>> bucket_of(100), bucket_of(10_000), bucket_range(bucket_of(10_000))
 (100, 526, (9984, 10111))
 
-It also holds the bit rates of a bus, and the duration of a CAN FD frame at these rates.
+The module also holds the bit rates of a bus, and the duration of a CAN FD frame at these rates.
 
 >>> frame = can.FdFrame.parse("123##1AABB")
 >>> BitRates(500_000, 2_000_000).bits(frame), BitRates().bits(frame)

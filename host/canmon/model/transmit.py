@@ -204,7 +204,7 @@ class PdoFrames:
     def remember(self, text: str) -> None:
         """Store the values of a sent frame.
 
-        They are used for objects that a later frame does not name.
+        The values are used for objects that a later frame does not name.
         """
         pdo, (_, fields) = text.split(maxsplit=1)[0].lower(), self._fields(text)
         self._remembered[pdo] = {place.name: value for place, value in fields}

@@ -493,7 +493,7 @@ def browser() -> str:
 def _unboxed() -> Sequence[str]:
     """Return the option to run Chromium as root.
 
-    Its sandbox refuses that, but containers run as root.
+    The sandbox of Chromium refuses to run as root, but containers run everything as root.
     """
     return ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
 

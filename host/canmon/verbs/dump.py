@@ -119,7 +119,7 @@ _POLL_US: Final = 100_000
 _Take = Callable[[list[printer.DecodedFrame], int, "Sequence[Mark]"], bool]
 """Function that takes frames, the number of lost frames, and later events.
 
-It returns whether to end.
+The function returns whether to end.
 """
 
 _shown: Final = add_options(

@@ -133,7 +133,7 @@ def _error_behavior(section: BusFileSection) -> dict[int, int]:
 def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: BusMaster) -> None:
     """Write the heartbeat time of the master that a slave watches.
 
-    This write is before all others.
+    The write is placed before all other writes.
     """
     time_ms = int(master.heartbeat_producer_ms * master.heartbeat_multiplier)
     entries = {sub: sheet.value(_CONSUMER, sub) for sub in sheet.subs(_CONSUMER) if sub}

@@ -261,7 +261,7 @@ def _peer(peer: int | None) -> dict[str, str]:
 def _heartbeat_time(binding: Binding, number: _ReadNumber) -> str:
     """Choose a heartbeat time in hex.
 
-    It differs from the original time and the time of the checks.
+    The chosen time differs from the original time and from the time in the checks.
     """
     bound = binding.bound.get("heartbeat")
     default = bound.entry.default if isinstance(bound, BoundObject) else b""
@@ -396,7 +396,7 @@ class Subject:
     def restorable(self, level: check.Level) -> list[check.Address]:
         """Return the objects that a run may change, either directly or by a reset.
 
-        They are read before the run, and written after it.
+        The objects are read before the run, and written after the run.
         """
         highest = PROFILE if level is check.Level.INTRUSIVE else MANUFACTURER
         apart = {*PROGRAMS, *STORAGE}

@@ -92,7 +92,7 @@ def _reset_drive(entry: NodeEntry) -> Script[None]:
 def _control(entry: NodeEntry, words: tuple[tuple[int, int], ...]) -> Script[None]:
     """Write controlwords.
 
-    Each follows when the statusword has confirmed the previous controlword.
+    Each controlword follows when the statusword has confirmed the previous controlword.
     """
     for controlword, wanted in words:
         yield from download_number(_CONTROLWORD, 0, controlword, 2)

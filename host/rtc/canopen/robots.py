@@ -229,7 +229,7 @@ _FULL: Final = 32_767
 class FourX(WheeledBase):
     """A robot that steers like a tank, in velocity mode.
 
-    Its pose is integrated from measured speeds.
+    The pose is integrated from measured speeds.
 
     If no new speed arrives, the last one is used.
 

@@ -111,7 +111,7 @@ def _pairs(
 ) -> Iterator[tuple[Consumer[Any], Provider[Any]]]:
     """Find a provider for each consumer.
 
-    It has the same type, and if possible the same instance name.
+    The provider has the same type as the consumer, and if possible the same instance name.
     """
     for consumer in calling.consumers:
         wanted = consumer.profile

@@ -284,7 +284,7 @@ class _Waiting:
 class Surroundings:
     """Collector that adds the frames before and after a finding to it.
 
-    It holds findings until then.
+    The collector holds each finding until the frames after it have arrived.
 
     Args:
         frames: number of frames before, and number of frames after a finding.

@@ -321,7 +321,7 @@ class _Guarding:
 class Toggle(RuleDemand):
     """Demand that the toggle bit of node guarding changes with each answer.
 
-    It is 0 after a boot-up.
+    The toggle bit is 0 after a boot-up.
 
     An answer is a frame after a request. If a log has no requests, all frames after a frame with
     the toggle bit set count as answers. A node that produces heartbeats sends no answers.

@@ -836,8 +836,7 @@ class _BusJudge:
     def _peak(self) -> tuple[int, tuple[int, int]]:
         """Return bits per second of the busiest half second, and the rows of a half second.
 
-        These rows are the ends of the first half second above the limit, or else of the busiest
-        one.
+        The rows are the ends of the first half second above the limit, or else of the busiest one.
         """
         first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
         steps = self._bits_by_step(first_us)

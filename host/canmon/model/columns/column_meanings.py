@@ -51,7 +51,7 @@ _Payloads = npt.NDArray[np.uint64]
 _Write = Callable[[cells.Texts, Ints, _Payloads, Ints], None]
 """Function that writes the meanings of frames, except remote frames.
 
-Its arguments are texts, rows, payloads and lengths.
+The arguments of the function are texts, rows, payloads and lengths.
 """
 
 _FEW: Final = 16

@@ -392,7 +392,7 @@ class NodeMemory:
     def source(self, index: int) -> str:
         """Return the source of the values of an object.
 
-        It is traffic if traffic contained a value.
+        The source is traffic if traffic contained a value.
         """
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
         if any(entry in self._now for entry in entries):

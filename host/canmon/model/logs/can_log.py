@@ -584,7 +584,7 @@ _MARKS: Final = "marks of gaps and triggers"
 class CanLogWriter:
     """A log written by python-can.
 
-    These formats number their buses. `can3` is number 3. Buses with other names get free numbers,
+    The formats number their buses. `can3` is number 3. Buses with other names get free numbers,
     which `words` lists.
 
     Raises:

@@ -111,7 +111,7 @@ class ScreenClock:
     def of(cls, text: str) -> ScreenClock:
         """Return the clock of a text.
 
-        Its stamps are deltas if the first spans fall often or by much.
+        The stamps are deltas if the first spans fall often or by much.
         """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
@@ -188,7 +188,7 @@ def _lost_frames(comment: str) -> int:
 def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return the content of other lines of a screen.
 
-    These lines are lines of serial ports, error frames in words, candump's reports of dropped
+    Such lines are lines of serial ports, error frames in words, candump's reports of dropped
     frames, and frames that python-can prints.
     """
     if _SERIAL.fullmatch(text):

@@ -47,7 +47,7 @@ _RESERVE_BYTES: Final = 256 << 10
 MAX_PRE_FRAMES: Final = 150_000
 """Maximum number of frames before a trigger.
 
-They are eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB.
+This number is eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB.
 """
 
 _DISK_PARTS: Final = 4

@@ -43,7 +43,7 @@ class Use(Enum):
 class EntryFacts(NamedTuple):
     """The facts that decide which names an entry can stand for.
 
-    They are computed once for all names.
+    The facts are computed once for all names.
 
     Attributes:
         entry: entry of the dictionary.
@@ -99,8 +99,8 @@ class WantedObject(NamedTuple):
         An entry to be written accepts what its description allows, without further rules of CiA
         301.
 
-        This is one loop without function calls, because calls took a tenth of the time of a single
-        check.
+        The function is one loop without function calls, because calls took a tenth of the time of a
+        single check.
         """
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE
         found = [

@@ -211,7 +211,7 @@ HOST_GAP_US: Final = 10_000
 """Excess duration of a wait, or of a pause between waits, above which the host counts as late."""
 
 _HELD_US: Final = 20_000
-"""Delay of a sent frame that may change what the node does, so that the check is inconclusive."""
+"""Delay of a frame above which the node may act differently, and the check is inconclusive."""
 _PAUSE_US: Final = 10_000
 """Pause after an SDO request that has no answer.
 

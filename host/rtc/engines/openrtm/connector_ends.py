@@ -435,7 +435,7 @@ class ServiceEnd(ConnectorEnd):
     def join(self, values: dict[str, str]) -> ConnectorBase:
         """Join a port that represents the peer's port.
 
-        It has the published interfaces, and calls them.
+        The other port provides what was published, and calls the peer.
         """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:

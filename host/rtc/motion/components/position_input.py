@@ -29,7 +29,7 @@ USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
 class PositionInput(RtComponent):
     """A component that sends one command after the other.
 
-    Each waits for the previous one to finish.
+    Each command waits until the previous command has finished.
 
     The original waits at its console in on_execute. This component does not block. The owner of the
     console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its

@@ -65,7 +65,7 @@ class RefHard(Protocol):
 class RefHardRh3(RtComponent):
     """A component that exchanges data with the base once a period.
 
-    It sends speeds and receives angles.
+    The component sends speeds and receives angles.
 
     In on_execute, the component reads the answer of the previous period and writes the wheel
     angles. In on_state_update, after all components have executed, it sends the speeds of this
