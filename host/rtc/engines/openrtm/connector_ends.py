@@ -435,7 +435,7 @@ class ServiceEnd(ConnectorEnd):
     def join(self, values: dict[str, str]) -> ConnectorBase:
         """Join a port that represents the peer's port.
 
-        The other port provides what was published, and calls the peer.
+        That port provides the services that the peer published, and makes the calls to the peer.
         """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:
