@@ -1,4 +1,4 @@
-"""The physical effects that a command may have, as a sentence. It is empty if nothing moves."""
+"""Physical effects that a command may have, as a sentence, or an empty text if nothing moves."""
 
 from __future__ import annotations
 

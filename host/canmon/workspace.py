@@ -401,7 +401,7 @@ class PanelSettings:
                 raise self.workspace.wrong(error, panel.section) from None
 
     def unknown(self) -> list[str]:
-        """Return the unknown settings of the workspace. They stay in the file."""
+        """Return the unknown settings of the workspace. Unknown settings stay in the file."""
         known = {panel.section: set(panel.save()) for panel in self._panels}
         words = [name for name in self.workspace.sections() if name not in (*_FRAME, *known)]
         for name, keys in known.items():

@@ -330,7 +330,10 @@ class Dialogue:
             self._keep_misnamed(now_us, named, data)
 
     def _keep_misnamed(self, now_us: int, named: Object | None, data: bytes) -> None:
-        """Keep an answer that names another object. It is used unless the right answer follows."""
+        """Keep an answer that names another object.
+
+        The answer is used unless the right one follows.
+        """
         if self._on_misnamed is None or named is None or named in self._unanswered:
             return
         self._misnamed = data

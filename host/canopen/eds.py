@@ -16,7 +16,8 @@ MOST_BYTES: Final = 32_000_000
 def read_eds_bytes(path: Path) -> bytes:
     """Read a file.
 
-    OSError is raised if it cannot be read, EdsError if it is too large for an EDS.
+    OSError is raised if the file cannot be read. EdsError is raised if the file is too large for an
+    EDS.
     """
     with path.open("rb") as file:
         data = file.read(MOST_BYTES + 1)

@@ -185,7 +185,7 @@ def _words(text: str) -> list[str]:
 
 
 HEX: Final = "hex"
-"""Data type for bytes. It is the type of CANopenNode, and the format if no type is given."""
+"""Data type for bytes, which is the type of CANopenNode, and the format if no type is given."""
 
 NUMBERS: Final = {
     "b": DataType.BOOLEAN,
@@ -229,7 +229,7 @@ def encode(name: str, words: Sequence[str]) -> bytes:
 
     Args:
         name: name of a data type in `_NAMES`.
-        words: value as the client wrote it. It is a single word except for `hex`.
+        words: value as the client wrote it, which is a single word except for `hex`.
 
     Raises:
         GatewayError: the words are not a value of this type.

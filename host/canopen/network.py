@@ -154,7 +154,7 @@ class NodeSession:
     def receive(self, now_us: int, frame: CanFrame) -> NmtState | None:
         """Process a frame of the bus.
 
-        Return the state that it reports, or None if it reports none.
+        Return the state that the frame reports, or None if it reports none.
         """
         can_id, data, remote, extended, _ = frame
         if remote or extended:

@@ -19,7 +19,7 @@ class PeriodicTimer:
         period_us: period, or 0 for none.
 
     Attributes:
-        due_us: end of the current period. It is `NEVER` before the start, or if the period is 0.
+        due_us: end of the current period, or `NEVER` before the start and if the period is 0.
     """
 
     def __init__(self, period_us: int) -> None:

@@ -188,7 +188,7 @@ def as_is(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Provide all three standard streams during the block. They replace control characters.
+    """Provide all three standard streams during the block, with control characters replaced.
 
     If standard error is a file on a full disk, the command continues. The messages are dropped, and
     the exit status does not change.

@@ -47,7 +47,7 @@ _NO_MSGPACK: Final = "msgpack not installed"
 
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
-    """Return a message. Its timestamp is in seconds, as in python-can."""
+    """Return a message. The timestamp of the message is in seconds, as in python-can."""
     if isinstance(frame, FdFrame):
         return _fd_message(frame, at_us)
     return can.Message(
@@ -435,7 +435,7 @@ class CanLink:
         Args:
             channel: bus of the interface, such as `can0`.
             interface: python-can's name for the adapter type, such as `socketcan`.
-            bit_rate: bits per second, if the interface sets it.
+            bit_rate: bit rate in bit/s, used if the interface sets the bit rate.
 
         Returns:
             A link that owns the bus. Close the link after use.

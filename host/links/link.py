@@ -148,7 +148,7 @@ class ReopeningLink(Generic[W]):
     line, for example after the cable is plugged in again or the emulator is restarted.
 
     Args:
-        open_link: function that opens the line. It is called at once.
+        open_link: function that opens the line, which is called at once.
 
     Raises:
         LinkClosed: the line cannot be opened.

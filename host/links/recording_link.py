@@ -141,7 +141,7 @@ class RecordingLink(Generic[W]):
     def _write(
         self, at_us: int, mark: Mark, traffic: bytes | CanFrame = b"", text: str = ""
     ) -> None:
-        """Write a line. Its time is never before the time of the previous line."""
+        """Write a line. The time of a line is never before the time of the previous line."""
         with self._lock:
             self._latest_us = max(self._latest_us, at_us - self._start_us)
             record = BenchRecord(self._latest_us, self._name, mark, traffic, text)

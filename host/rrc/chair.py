@@ -51,7 +51,7 @@ _SILENT_US: Final = 300_000
 """Time without a status line after which the RRC counts as silent. Status lines come each 10 ms."""
 
 _ASK_US: Final = 1_000_000
-"""Time without a status line after which the RRC is queried. It sends none while VR2 is off."""
+"""Time without a status line after which the RRC is queried. VR2 may be off, and then none come."""
 
 _TAKEN_US: Final = 200_000
 """Time after which a status line shows the effect of a command."""
@@ -371,7 +371,7 @@ class Chair(Closing):
         return None
 
     def stop(self) -> None:
-        """Stop the motors, and wait for a status line that confirms it.
+        """Stop the motors, and wait for a status line that confirms the stop.
 
         Without this confirmation, VR2 is switched off.
         """

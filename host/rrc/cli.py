@@ -331,7 +331,7 @@ def _beep(**options: Any) -> None:
 @main.command("poweroff")
 @works_in(f"{_VERBS}:poweroff")
 def _poweroff(**options: Any) -> None:
-    """Force VR2 to stop. Its power button must be pressed afterwards.
+    """Force VR2 to stop. Press the power button of VR2 afterwards.
 
     \b
     rrc /dev/ttyACM0 poweroff

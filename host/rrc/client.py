@@ -30,8 +30,8 @@ _T = TypeVar("_T")
 class RrcClient(Closing):
     """A synchronous client of a Robotic Relay Communicator, without a background thread.
 
-    Time passes only in the calls of this client. While a watchdog is set, each call renews it in
-    time. A program that hangs does not renew the watchdog, and the watchdog stops VR2.
+    Time passes only in the calls of this client. While a watchdog is set, each call renews the
+    watchdog in time. A program that hangs does not renew the watchdog, and the watchdog stops VR2.
 
     After `max_refusals` ER lines in a row for one command, the client raises RrcStopped. The client
     then sends only `poweroff`, until the RRC is initialized again or `resume` is called.
@@ -39,7 +39,7 @@ class RrcClient(Closing):
     Values out of range raise `BadParameters` (a ValueError) before the command is sent. Every
     method that sends a command raises the same errors as `command`.
 
-    The client leaves the RRC a tenth of its time. Therefore a call may wait 6.25 ms for each line
+    The client keeps a tenth of the RRC's time free. Therefore a call may wait 6.25 ms for each line
     sent before, and 3.75 ms for each answer. `load` returns the resulting load of the RRC.
 
     The client does not check that the RRC received the values as they were sent. CHECK does not
@@ -149,7 +149,7 @@ class RrcClient(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line received in any call. Check its age."""
+        """The newest status line received in any call. Check the age of this line before use."""
         return self._inbox.latest_status
 
     @property
@@ -171,8 +171,8 @@ class RrcClient(Closing):
             command: command to send.
             confirm: whether to wait for the confirmation. False sends the command without waiting,
                 for a stream of commands. An ER that arrives later then counts as a refusal. By
-                default, the client waits for all commands except `output` with stablemode on. It
-                always waits for `stablemode`.
+                default, the client waits for all commands except `output` with stablemode on. For
+                `stablemode`, the client always waits.
 
         Returns:
             The answer to `device`, `version` or `date`, empty for other commands.
@@ -346,7 +346,7 @@ class RrcClient(Closing):
         self.command(cmd.Status(int(on)))
 
     def poweroff(self) -> None:
-        """Force VR2 to stop. Its power button must then be used to switch it off."""
+        """Force VR2 to stop. VR2 must then be switched off by its power button."""
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:
@@ -365,8 +365,9 @@ class RrcClient(Closing):
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
         """Send `output`. If the stick was driving, select the slowest speed mode first.
 
-        The manual advises this for every change between limit and output. The client waits for the
-        confirmation of the first output. Select the speed mode again afterwards.
+        The manual advises the slowest speed mode for every change between limit and output. The
+        client waits for the confirmation of the first output. Select the speed mode again
+        afterwards.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.

@@ -73,7 +73,7 @@ def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
     Raises:
         click.ClickException: the command failed. The message is one line, and the exit status is 1
             or 3.
-        KeyboardInterrupt: a signal was received. It is raised after the chair was stopped.
+        KeyboardInterrupt: a signal was received. The error is raised after the chair was stopped.
     """
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None

@@ -104,7 +104,10 @@ class ComponentAction:
     """
 
     def on_initialize(self) -> ReturnCode:
-        """Initialize the component. It stays Created unless this callback returns RTC_OK."""
+        """Initialize the component.
+
+        The component stays Created unless this callback returns RTC_OK.
+        """
         return _OK
 
     def on_finalize(self) -> ReturnCode:
@@ -132,7 +135,7 @@ class ComponentAction:
         return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period of `ec` in Active. This is the first pass."""
+        """Do the work of a period of `ec` in Active, in the first pass."""
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
@@ -527,10 +530,10 @@ class ExecutionContext:
         period_us: length of a period.
         running: whether the context runs, which is True between start and stop.
         allows_period: function that is called with each new period in us, if not all periods are
-            possible. It returns whether the period is possible.
+            possible. The function returns whether the period is possible.
         on_move: function that is called after each move with the component, its state and the
-            result of the callback of the move. It is also called if on_reset failed and the
-            component stayed in Error. The state is Created if the component left the context.
+            result of the callback of the move. The function is also called if on_reset failed and
+            the component stayed in Error. The state is Created if the component left the context.
 
     Raises:
         ValueError: the rate is out of range.
@@ -591,7 +594,7 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def stop(self) -> ReturnCode:
-        """Stop the context, and call on_shutdown of every participant. Their states do not change.
+        """Stop the context, and call on_shutdown of every participant. The states do not change.
 
         Returns:
             PRECONDITION_NOT_MET unless the context runs. Otherwise, RTC_OK.

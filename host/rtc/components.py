@@ -156,7 +156,7 @@ class SeqOut(RtComponent):
 
 
 class ConfigSample(RtComponent):
-    """A component with unused parameters. Their names and defaults are OpenRTM's."""
+    """A component with unused parameters. The names and defaults are those of OpenRTM."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConfigSample", "Configuration example component")
 

@@ -91,7 +91,7 @@ class Parameter(Generic[V]):
         widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
 
     Attributes:
-        value: present value. It changes only between callbacks of the component.
+        value: present value, which changes only between callbacks of the component.
 
     Raises:
         ValueError: the constraint does not allow the default, or its notation is unknown.
@@ -228,8 +228,8 @@ class Configuration:
 
         Args:
             name: name of the parameter in the configuration sets.
-            default: default value, which is a bool, int, float, str or a tuple of one of these. Its
-                type is the type of the values.
+            default: default value, which is a bool, int, float, str or a tuple of one of these. The
+                type of the default is the type of the values.
             constraint: constraint that the values must meet, such as `0<=x<=10` (`Constraint`).
             unit: unit of the value, for display.
             widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.

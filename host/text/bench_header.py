@@ -51,8 +51,8 @@ class DeviceEntry:
 
     Attributes:
         wire: name of the wire of the device.
-        type: device type, model, EDS or DCF file, or `FILE.py:Class`. It is empty if a program made
-            the device, which then cannot be rebuilt.
+        type: device type, model, EDS or DCF file, or `FILE.py:Class`. The text is empty if a
+            program made the device, which then cannot be rebuilt.
         config: settings of the device.
         node_id: node-ID of a CANopen node.
         sha256: SHA-256 of the file in `type`.

@@ -362,7 +362,7 @@ class Section:
 
 
 def read_section(text: str) -> Section:
-    """Read a TOML text. Its mistakes are in `notes`."""
+    """Read a TOML text. The mistakes of the text are in `notes`."""
     document = read_toml(text)
     return Section(Notes(document), (), document.values)
 

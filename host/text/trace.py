@@ -99,7 +99,7 @@ class Record:
 def trace_text(data: bytes) -> str:
     """Return the text of a trace.
 
-    Raise TraceError if it is empty or its first line is incomplete.
+    Raise TraceError if the text is empty or its first line is incomplete.
     """
     try:
         text = data.decode("ascii")

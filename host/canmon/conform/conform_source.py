@@ -85,7 +85,7 @@ def open_conform_source(
 
     Args:
         word: word on the command line, such as `can0`, `slcan:/dev/ttyACM0@500k` or a rig file
-            `bench.toml`. It is None if the options name a bus.
+            `bench.toml`, or None if the options name a bus.
         node_id: node-ID of the node, which selects the bus of a rig with several buses. None
             selects the first bus.
         options: options of a bus, such as interface and bit rate.

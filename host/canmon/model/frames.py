@@ -1,6 +1,7 @@
 """The input of a monitor: frames and lines of serial ports, with their identifiers and text.
 
-An identifier is one number. It is the CAN-ID with flags above it. candump's filters apply to it.
+An identifier is one number, which is the CAN-ID with flags above it. The filters of candump apply
+to identifiers.
 
 >>> chosen = CandumpFilter.parse("123:7FF,400~700,#FF")
 >>> [chosen.passes(ident) for ident in (0x123, 0x400, 0x501, ERROR_FLAG | 0x20, ERROR_FLAG | 0x100)]
@@ -95,7 +96,7 @@ EXTENDED: Final = 1 << 31
 REMOTE: Final = 1 << 30
 ERROR: Final = 1 << 29
 FD: Final = 1 << 33
-"""Flag of CAN FD. It is above the identifier and the flags of struct can_frame."""
+"""Flag of CAN FD, which is above the identifier and the flags of struct can_frame."""
 
 
 def ident_of(frame: CanFrame) -> int:

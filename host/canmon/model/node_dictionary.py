@@ -182,7 +182,7 @@ def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) ->
 
 
 def _shortened(name: str, width: int) -> str:
-    """Return a shortened name. Its end distinguishes entries, so the end is kept.
+    """Return a shortened name. The end of a name distinguishes entries, so the end is kept.
 
     >>> _shortened("pre_defined_error_field.error_1", 20)
     'pre_defin…ld.error_1'

@@ -1,6 +1,6 @@
 """Sequences of frames to send and to expect, step by step. The caller passes the time.
 
-The module executes sequences. Their conditions are frames, given by a pattern or a filter.
+The module executes sequences. Conditions of a sequence are frames, given by a pattern or a filter.
 
 >>> from tickrig.wire.can import CanFrame
 >>> frames = map(CanFrame.parse, ("585#6041", "585#60F1AA", "585#6042"))

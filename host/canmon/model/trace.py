@@ -106,8 +106,8 @@ class FrameTrace(Ring):
         capacity: number of frames to keep.
 
     Attributes:
-        origin_us: time of the first frame, which is the origin of displayed times. It is None
-            before the first frame.
+        origin_us: time of the first frame, which is the origin of displayed times, or None before
+            the first frame.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -176,7 +176,7 @@ class DisplayFilter:
         wanted: function that returns whether a row passes, or None for all rows.
 
     Attributes:
-        passed: rows that passed. It is the trace itself if all rows pass.
+        passed: rows that passed, or the trace itself if all rows pass.
     """
 
     def __init__(self, trace: FrameTrace, wanted: Filter | None = None) -> None:

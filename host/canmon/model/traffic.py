@@ -34,7 +34,7 @@ EXACT_US: Final = 1 << SUB_BITS + 1
 """Time below which each time has a bucket of its own."""
 
 _KEPT: Final = 2_048
-"""Number of buckets whose middle is cached. They are all buckets below an hour."""
+"""Number of buckets whose middle is cached, which are all buckets below an hour."""
 
 
 def bucket_of(time_us: int) -> int:
@@ -96,8 +96,8 @@ class GapRow(NamedTuple):
             part in 64 too long.
         max_us: longest gap.
         jitter_us: mean difference between a gap and the previous gap, rounded down.
-        cycle_us: cycle of the frames, including missed frames. It is None unless three quarters of
-            the gaps are within a quarter of the median.
+        cycle_us: cycle of the frames, including missed frames. The value is None unless three
+            quarters of the gaps are within a quarter of the median.
         missed: upper limit of the number of missed frames of that cycle, or None without a cycle.
     """
 
@@ -578,7 +578,7 @@ class BusRow(NamedTuple):
 
 
 class TrafficSnapshot(NamedTuple):
-    """All rows at one moment. They never change.
+    """All rows at one moment. The rows never change.
 
     Attributes:
         at_us: moment of the snapshot.

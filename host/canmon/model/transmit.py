@@ -316,7 +316,7 @@ class TransmitRow:
         frame: frame to send.
         period_us: period of a cyclic row, or `_ONCE` for a row that is sent by hand.
         fields: fields that change each time.
-        due_us: time of the next transmission. It is `NEVER` while the row is not enabled.
+        due_us: time of the next transmission, or `NEVER` while the row is not enabled.
         count: number of transmissions, or 0 for no limit.
 
     Attributes:

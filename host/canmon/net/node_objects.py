@@ -315,7 +315,7 @@ def _range(text: node_memory.ObjectText) -> str:
 
 
 def limits(objects: NamedObjects, entry: Entry) -> str:
-    """Return the range of a value in the EDS, for a message. It is empty without a range."""
+    """Return the range of a value in the EDS, for a message, or an empty text without a range."""
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):
         return ""

@@ -329,7 +329,7 @@ def _save_text(sub: int) -> str:
 
 
 def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
-    """Make a node erase stored parameters. This takes effect at its next reset."""
+    """Make a node erase stored parameters. The erasure takes effect at the node's next reset."""
     with of_node(node_id):
         session.bus.write(node_id, _RESTORE, sub, b"load", _PATIENCE_US)
     say(f"node {node_id}: restored; the defaults count from its next reset")

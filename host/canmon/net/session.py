@@ -49,8 +49,8 @@ class _Work:
     """The planned steps, so that the message of an early end can list the finished ones.
 
     Attributes:
-        ending: final state of the nodes, which is reported in any case. It is empty if there is
-            nothing to report.
+        ending: final state of the nodes, which is reported in any case, or an empty text if there
+            is nothing to report.
     """
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ def _heading(series: Series) -> str:
 
 
 def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int, int, float]]:
-    """Yield time, number of the series, number of the sample, and value. This is the sort order."""
+    """Yield time, number of the series, number of the sample, and value, in sorting order."""
     seen = series.between(view.from_us, view.to_us)
     for index in range(seen.start, seen.stop):
         yield series.at_us[index], number, index, series.values[index]

@@ -226,7 +226,8 @@ class BlockPrinter:
 
     Args:
         output: format of the output, which is text or a log.
-        lines: writer of single text lines. It and this object continue where the other one ended.
+        lines: writer of single text lines. The writer and this object continue where the other one
+            ended.
         decoder: decoder of frames, or None for no decoding. Other code may feed the decoder between
             two calls.
     """

@@ -67,8 +67,8 @@ class Verdict(NamedTuple):
 
     Attributes:
         diagnosis: the whole diagnosis.
-        around: surroundings by the number of a frame: the number of the first frame around it, and
-            the frames around it.
+        around: surroundings of a frame by its number. The value is the number of the first frame
+            around it, and the frames around it.
     """
 
     diagnosis: Diagnosis

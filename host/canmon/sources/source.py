@@ -57,7 +57,7 @@ class AnySource(Generic[_Taken_co]):
     """A source of frames, or of lines of a serial port, as they arrive.
 
     Attributes:
-        live: whether new data arrive with time. It is False if all data exist already.
+        live: whether new data arrive with time, or False if all data exist already.
         failed: reason why the source ended early, empty if it did not.
         marks: events after the frames that `poll` returned last.
         recorded: whether a recorder wrote these marks and has already reported them.
@@ -170,7 +170,8 @@ class BusSpec:
     A bus with a data bit rate is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon. It is part of the channel if -i names the interface.
+        prefix: text before the first colon. This text is part of the channel if -i names the
+            interface.
     """
 
     interface: str | None = None
@@ -563,7 +564,7 @@ SMALL_BYTES: Final = 1 << 20
 
 
 class BlockLog(AnySource["Columns"]):
-    """A log file as columns, with one block for each poll. It holds only one block in memory.
+    """A log file as columns, with one block for each poll. Only one block is in memory.
 
     Attributes:
         no_columns: whether reading ended early because the file must be read frame by frame.

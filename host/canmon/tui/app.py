@@ -201,7 +201,7 @@ class StatusLine(Widget):
         self.line: Line = ()
 
     def refresh_view(self) -> None:
-        """Show the present status. This is called ten times a second."""
+        """Show the present status. The app calls this ten times a second."""
         with self._session.lock:
             line = self._status()
         if line != self.line:

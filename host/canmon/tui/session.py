@@ -139,7 +139,7 @@ _MARKS_KEPT: Final = 1_000
 _SILENT_US: Final = 3_000_000
 
 _Send = Callable[[CanFrame | FdFrame], None]
-"""Function that sends a frame on one bus. It raises SourceFailed if it cannot."""
+"""Function that sends a frame on one bus. It raises SourceFailed if sending fails."""
 
 
 class Task(Protocol):
@@ -178,7 +178,7 @@ class Session:
     Args:
         source: source of the frames.
         model: model that processes the frames.
-        buses: buses to send on, by channel. It is empty for a log.
+        buses: buses to send on, by channel, or an empty mapping for a log.
         clock: function that returns the time of the session in microseconds.
 
     Attributes:

@@ -211,8 +211,8 @@ class SettingsScreen(ModalScreen[None]):
 
     Args:
         settings: the present settings.
-        apply: function that is called with the entered settings. It raises InputError if they
-            cannot be used.
+        apply: function that is called with the entered settings. It raises InputError if the
+            settings cannot be used.
     """
 
     HELP = """

@@ -74,7 +74,7 @@ class _TriggerKeys:
     """A wait for Enter on standard input, if it is a terminal, and for SIGUSR1.
 
     Args:
-        typed: whether to wait for Enter. It is False if standard input is recorded.
+        typed: whether to wait for Enter, or False if standard input is recorded.
     """
 
     def __init__(self, typed: bool) -> None:

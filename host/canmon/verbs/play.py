@@ -58,7 +58,7 @@ class _Due(NamedTuple):
 
 @dataclass(slots=True)
 class ReplayPlan:
-    """Frames of a log in the order of the log. Their times never go back.
+    """Frames of a log in the order of the log. Times of the frames never go back.
 
     Args:
         log: frames of the log, which are read again for each loop.
@@ -69,8 +69,8 @@ class ReplayPlan:
         to_us: end of the span to send, counted from the first frame, or None for the end of the
             log.
         loops: number of loops, or `_FOREVER` to repeat until the replay is stopped. A loop begins
-            where the previous loop ends, which is at `to_us`, or else at the last frame. It begins
-            at least 1 ms after the begin of the previous loop.
+            where the previous loop ends, which is at `to_us`, or else at the last frame. A loop
+            begins at least 1 ms after the begin of the previous loop.
 
     Attributes:
         left_out: number of omitted frames in the span, which are error frames and frames of other

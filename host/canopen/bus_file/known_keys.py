@@ -95,8 +95,8 @@ def check_keys(
     Args:
         section: the section to check.
         known: all keys that the section may have.
-        open_to_others: whether a driver of the user may read other keys. They are reported as keys
-            for that driver, except keys that look like a misspelling.
+        open_to_others: whether a driver of the user may read other keys. Other keys are then
+            reported as keys for that driver, except keys that look like a misspelling.
     """
     known = tuple(known)
     for key in section.fields:

@@ -18,7 +18,7 @@ Values = dict[_Address, bytes]
 _COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
 """Objects that trigger an action when written: error history, store, restore, programs."""
 _CONFIGURED: Final = 0x1020
-"""Object "verify configuration". Its date and time are written last."""
+"""Object "verify configuration". The date and time in this object are written last."""
 _COB_ID: Final = 1
 """Sub-index of the communication parameter of a PDO."""
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)

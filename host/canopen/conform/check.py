@@ -316,7 +316,7 @@ class ConformancePlan:
         seed: seed for the order of the objects. 0 keeps the order of the dictionary.
         stimulus: function that operates the inputs of the device, or None if there is none.
         confirm: function that is called before actions that concern other nodes or cannot be
-            undone. It returns whether to do them.
+            undone. It returns whether to do the action.
         longest_s: time in seconds after which no further check starts.
         resolution_us: resolution of the time stamps of the adapter.
         shared_host: whether the node may be a process of this machine. Such a node is delayed
@@ -346,7 +346,7 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Return whether a check of a group may be selected. This is used before the check is made.
+        """Return whether a check of a group may be selected, before the check is made.
 
         Args:
             group: group of the check.

@@ -81,7 +81,7 @@ class KnownState:
 
         Args:
             addresses: addresses of the objects.
-            held: values that were just read. Their objects are not read again.
+            held: values that were just read. The objects with these values are not read again.
         """
         for at in addresses:
             if at in self.original:

@@ -145,7 +145,7 @@ def longest_ms(name: str, words: Sequence[Any]) -> int:
 
 
 def _transfer(words: Sequence[Any]) -> int:
-    """Return the duration of a transfer of the test pattern. Its size is the second word."""
+    """Return the duration of a transfer of the test pattern. The second word is the size."""
     return _TRANSFER_MS + int(words[1]) * _PER_BYTE_US // 1_000
 
 

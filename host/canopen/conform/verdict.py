@@ -52,13 +52,13 @@ class CheckOutcome:
 
     Attributes:
         verdict: verdict of the attempt.
-        reason: reason in one line, with the received and the allowed frames. It is empty if the
-            check passed.
+        reason: reason in one line, with the received and the allowed frames, or an empty text if
+            the check passed.
         evidence: frames on the bus.
         start_us: bus time of the start, since the start of the run.
         end_us: bus time of the end, since the start of the run.
-        wanted: patterns of the expected frame, one of which must match. They are set if the attempt
-            failed because of a frame.
+        wanted: patterns of the expected frame, one of which must match, if the attempt failed
+            because of a frame.
     """
 
     verdict: CheckVerdict

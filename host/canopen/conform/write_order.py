@@ -100,7 +100,7 @@ def _pdo(pdo: int, left: Values, number: _Number) -> Iterator[Write]:
 
 
 def _sync(left: Values, number: _Number) -> Iterator[Write]:
-    """Stop the SYNC producer, write counter and period, and restart it if it is enabled."""
+    """Stop the SYNC producer, write counter and period, and restart an enabled producer."""
     given, before, cycle = (
         left.pop((_SYNC, 0), None),
         number((_SYNC, 0)),

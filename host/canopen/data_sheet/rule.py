@@ -89,7 +89,8 @@ class RuleFinding:
         line: line number, or 0 for the file as a whole.
         section: title of the section, empty outside of sections.
         text: value in the file, and the allowed values.
-        edits: edits that fix the violation. They are empty if a fix needs knowledge of the device.
+        edits: edits that fix the violation. There are no edits if a fix needs knowledge of the
+            device.
     """
 
     rule: _EdsRule

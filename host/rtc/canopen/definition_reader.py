@@ -23,7 +23,7 @@ from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 
 _Reader = Callable[[Item, str], Any]
-"""Function that reads a value of the tree. Its text names the value in messages."""
+"""Function that reads a value of the tree. The text argument names the value in messages."""
 
 
 def _compose(text: str) -> Item:

@@ -70,7 +70,7 @@ class PdoSource:
         )
 
     def receive(self, now_us: int, data: bytes) -> None:
-        """Write the values in a frame. Their time stamp is the time of reception."""
+        """Write the values in a frame. The time stamp of the values is the time of reception."""
         tm, values = Time.from_us(now_us), self._decode(data)
         if self._single:
             (port,) = self.ports
@@ -400,7 +400,7 @@ class ProxyRtc(RtComponent):
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
-        """Request Stopped. This replaces the request of on_deactivated."""
+        """Request Stopped. The request replaces the request of on_deactivated."""
         self.requested, self.ready = ProxyRequest.ABORT, False
         return _OK
 

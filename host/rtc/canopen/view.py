@@ -156,7 +156,7 @@ class ServerView:
 
     Use the view between the ticks of the server and in its thread.
 
-    Commands return at once. Their results appear in the states and events.
+    Commands return at once. The results appear in the states and events.
 
     Args:
         server: server to view.
@@ -229,7 +229,7 @@ class ServerView:
         self._node(node_id).boot(self._server.now_us)
 
     def restart(self, node_id: int) -> None:
-        """Reset a node by NMT, even a lost one. It becomes Active again if it was Active."""
+        """Reset a node by NMT, even a lost node. A node that was Active becomes Active again."""
         self._node(node_id).restart(self._server.now_us)
 
     def connect(self, first: str, second: str, properties: Mapping[str, str] | None = None) -> None:

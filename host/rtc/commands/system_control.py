@@ -305,7 +305,7 @@ class SystemControl(RequestDispatcher):
 
 
 def _texts(request: Object, key: str, count: int) -> list[str]:
-    """Return a list of strings. Its length is checked unless the wanted length is 0."""
+    """Return a list of strings. The length is checked unless `count` is 0."""
     value = request.get(key)
     texts = [text for text in value if isinstance(text, str)] if isinstance(value, list) else None
     if texts is None or texts != value or (count and len(texts) != count):

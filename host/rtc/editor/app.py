@@ -157,7 +157,7 @@ class SystemScreen(FramedApp):
         self.set_interval(PAINT_S, self.look)
 
     def look(self) -> None:
-        """Show the present state. This is called ten times a second, and after each command."""
+        """Show the present state. The app calls this ten times a second, and after each command."""
         for answer in self._link.take_answers():
             if answer.text:
                 self.notify(answer.text, severity="error" if answer.refused else "information")
@@ -245,7 +245,7 @@ class SystemScreen(FramedApp):
             self.push_screen(ChoiceScreen(f"disconnect {port} from", rows), chosen)
 
     def action_edit(self) -> None:
-        """Ask for the value of the row under the cursor. If it is a set, activate the set."""
+        """Ask for the value of the row under the cursor. If the row is a set, activate the set."""
         component, row = self._component(), self.details.row
         if component is None or row is None or row.item == _Setting() or row.item.peer:
             self._refuse("go to a parameter or set in the details (Tab)")

@@ -23,7 +23,7 @@ class CursorRow(NamedTuple, Generic[_T]):
     """A line, and the item that it represents.
 
     Attributes:
-        key: unique key of the item. It does not change while the item exists.
+        key: unique key of the item, which does not change while the item exists.
         line: text of the line.
         item: the represented item.
     """

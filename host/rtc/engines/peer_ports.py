@@ -371,7 +371,7 @@ class _PulledBuffer(RingBuffer[T]):
 class InPortPullConnector(_InPortConnector[T, P]):
     """A connector that fetches values of a peer's OutPort, in the thread of that peer.
 
-    Reading the InPort, or checking it for new values, does not wait. It requests the next value.
+    Reading the InPort, or checking it for new values, does not wait, but requests the next value.
     One value is fetched at a time. Therefore a value is as old as the previous reading.
 
     Args:

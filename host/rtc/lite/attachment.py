@@ -62,7 +62,7 @@ _LOG: Final = log_of(__name__)
 class Attachment:
     """Upkeep of a proxy: sending PINGs, removing the proxy of a lost device, searching the device.
 
-    The manager ticks the attachment. It ends if other code deletes its proxy.
+    The manager ticks the attachment. The attachment ends if other code deletes its proxy.
 
     Attributes:
         manager: manager of the system.
@@ -165,7 +165,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
     context: ExecutionContext | None = None,
     rate_hz: float = _RATE_HZ,
 ) -> RtcLiteProxy:
-    """Add a proxy to a system. Its name has the lowest free number, such as `LiteA0`.
+    """Add a proxy to a system. The name of the proxy has the lowest free number: `LiteA0`.
 
     Args:
         manager: manager of the system. It sends the PINGs, removes the proxy and finds the device

@@ -187,8 +187,8 @@ _PORTS_LOG: Final = log_of(__name__)
 class PortBridges:
     """The ports of a proxy, made from the profile of its device.
 
-    A value that does not fit the device, and data that fit no port, are logged and dropped. They do
-    not stop the proxy.
+    A value that does not fit the device, and data that fit no port, are logged and dropped. Such
+    values do not stop the proxy.
 
     Args:
         ins: in-ports of the device.
@@ -439,7 +439,7 @@ class RtcLiteProxy(RtComponent):
         return _code_of(self._channel.request(command, data))
 
     def _optional(self, command: LiteCommand) -> ReturnCode:
-        """Request a callback that a device need not have. Its absence is not a fault."""
+        """Request a callback that a device need not have. A missing callback is not a fault."""
         if (code := self._command(command)) is not ReturnCode.UNSUPPORTED:
             return code
         self._channel.trouble = ""

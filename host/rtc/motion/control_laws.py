@@ -47,7 +47,7 @@ class VelocityLimits:
 def steps(
     max_acc_v: float, max_acc_w: float, tick_s: float, acc_cycle_s: float
 ) -> tuple[float, float]:
-    """Return the steps that `max_acc_*` allow in a tick. They are given for each `acc_cycle_s`."""
+    """Return the steps that `max_acc_*` allow in a tick. The limits are given for `acc_cycle_s`."""
     share = tick_s / acc_cycle_s
     return max_acc_v * share, min(max_acc_w * share, _MOST_ANGULAR_ACCELERATION * tick_s)
 

@@ -392,7 +392,10 @@ class PathInterface(RtComponent):
     def _command(
         self, now: Time, mode: ports.RunMode, line: Pose, v: float = 0.0, w: float = 0.0
     ) -> None:
-        """Command the follower. It takes one message per period, so the last message counts."""
+        """Command the follower.
+
+        The follower takes one message per period, so the last one counts.
+        """
         self._order = Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now)
 
     def _report(self, now: Time, point: Pose, flag: int) -> None:

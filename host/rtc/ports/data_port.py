@@ -65,8 +65,8 @@ class OutPort(DataPort[T]):
         """Write a value to each connector, without waiting.
 
         Args:
-            value: struct of the port's `data_type`. Its numbers are checked only by connectors with
-                `corba_cdr`.
+            value: struct of the port's `data_type`. The numbers in the struct are checked only by
+                connectors with `corba_cdr`.
 
         Returns:
             PORT_OK if all connectors took the value, or if there are no connectors. Otherwise the

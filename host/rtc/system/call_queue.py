@@ -77,7 +77,7 @@ class CallQueue:
         raise TimeoutError(f"the system did not begin the call within {wait_s:g} s")
 
     def post(self, function: Callable[[], object]) -> None:
-        """Schedule a call of a function in the manager's thread. Its exceptions are logged.
+        """Schedule a call of a function in the manager's thread. Errors of the function are logged.
 
         Raises:
             RtcRefused: the system has ended.
@@ -153,7 +153,7 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 
 
 class Arrivals:
-    """Calls that are executed at the beginning of the next tick. They are an item of a schedule.
+    """Calls that are executed at the beginning of the next tick, as an item of a schedule.
 
     No code reads a value before the next tick, so values need not wake the manager's thread.
     Waking it for each value would take three times the processor time.

@@ -159,7 +159,10 @@ class LookupCache(Generic[_V]):
         return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))
 
     def value(self, address: str) -> _V | None:
-        """Return the value at an address, however old it is. This does not count as a look-up."""
+        """Return the value at an address, however old it is.
+
+        The call does not count as a look-up.
+        """
         return entry.value if (entry := self._entries.get(address)) is not None else None
 
     def forget_requests(self) -> None:

@@ -36,7 +36,7 @@ class Lookup(RtComponent, Generic[_V]):
     Periods do not wait for the service. A result that arrives in a later period is written in that
     period, with the time at which the ucode arrived. An entry older than `fresh` is requested
     again. The entry remains in use until the service answers, up to `keep`. The cache is in memory.
-    It is kept in Inactive and Error, and lost when the component ends.
+    The cache is kept in Inactive and Error, and lost when the component ends.
 
     After each look-up and each answer, the port `cache` gives these numbers: hits, hits that were
     not fresh, misses, misses of ucodes that the service does not know, failed requests, entries,

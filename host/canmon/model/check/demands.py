@@ -93,8 +93,8 @@ class RuleDemand:
 
     Attributes:
         due_us: time by which a frame must have arrived.
-        came: whether a frame that the demand counts has arrived. It is False if the demand counts
-            no frames.
+        came: whether a frame that the demand counts has arrived. The value is False if the demand
+            counts no frames.
         judged: whether a frame was compared with the demand.
         timed: whether the demand is about time. Such a demand judges nothing if all frames have the
             same time.
@@ -311,7 +311,7 @@ class _Guarding:
 
     Attributes:
         last: toggle bit of the latest answer, or None before the first answer.
-        requested: whether a request has no answer yet. It is None before the first request.
+        requested: whether a request has no answer yet, or None before the first request.
     """
 
     last: int | None = None

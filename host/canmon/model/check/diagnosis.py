@@ -180,7 +180,7 @@ class Diagnoser:
     """Collector of the frames of a source, which judges the frames when all have arrived.
 
     Args:
-        bit_rate: bit rate in bits per second, used for the load. It is None if unknown.
+        bit_rate: bit rate in bits per second, used for the load, or None if unknown.
         eds: content of EDS files by node-ID.
         without_errors: reason why the source cannot contain error frames.
         rules: rules learnt from a good log, or None for no such rules.
@@ -261,7 +261,7 @@ def diagnose(
 
     Args:
         frames: blocks of frames in the order of the log. Each block is columns or records.
-        bit_rate: bit rate in bits per second, used for the load. It is None if unknown.
+        bit_rate: bit rate in bits per second, used for the load, or None if unknown.
         eds: content of EDS files by node-ID.
     """
     one = Diagnoser(bit_rate, eds)

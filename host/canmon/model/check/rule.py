@@ -194,7 +194,7 @@ class Rule:
             evidence: traffic with at least one frame or error frame.
 
         Returns:
-            The reason. It is empty if the rule has judged something.
+            The reason, or an empty text if the rule has judged something.
         """
         by_absence = type(self).end is not Rule.end or self.wants(ERROR)
         if by_absence or any(self.wants(ident) for _, ident in evidence.seen):

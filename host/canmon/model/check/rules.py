@@ -34,8 +34,8 @@ class Rules:
 
     Attributes:
         max_load: largest load of any second in percent of the bit rate, or None for no limit.
-        bit_rate: bit rate in bits per second, if it is not known otherwise. It is not a rule by
-            itself.
+        bit_rate: bit rate in bits per second, if it is not known otherwise. The bit rate is not a
+            rule by itself.
         no_emcy: whether EMCY messages except error reset are forbidden.
         no_sdo_abort: whether aborted SDO transfers are forbidden.
         no_error_frames: whether error frames are forbidden.

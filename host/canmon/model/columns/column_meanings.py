@@ -126,7 +126,10 @@ class ColumnMeanings:
         return self._messages[ident]
 
     def _take_bus(self, bus: BusDecoder, frames: Columns, places: Ints, texts: cells.Texts) -> None:
-        """Decode data and remote frames with 11-bit identifiers. Their places are other rows."""
+        """Decode data and remote frames with 11-bit identifiers.
+
+        `places` are the rows of these frames in the block.
+        """
         begin = 0
         while begin < len(frames):
             begin = self._take_settled(bus, frames, begin, places, texts)
@@ -438,8 +441,8 @@ _SHORT: Final = 16
 def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
     """Return a function that writes the frames of a message.
 
-    The function first writes some random payloads. It is used only if it writes these as cantools
-    does, which supports more kinds of overlapping and odd signals.
+    The function first writes some random payloads. The function is used only if it writes these
+    payloads as cantools does, which supports more kinds of overlapping and odd signals.
     """
 
     def decode(data: bytes) -> Decoded:

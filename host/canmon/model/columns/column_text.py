@@ -36,7 +36,10 @@ _BLANKS: Final = np.array([b" " * count for count in range(frames.DATA_WIDTH + 3
 
 
 _SLAB: Final = 1 << 12
-"""Number of lines that are written at once. Their intermediate results fit into the cache."""
+"""Number of lines that are written at once.
+
+Intermediate results of these lines fit into the cache.
+"""
 
 
 def fits(columns: Columns) -> bool:
@@ -45,7 +48,7 @@ def fits(columns: Columns) -> bool:
 
 
 def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[cells.Part]:
-    """Write times of at least 0. Their seconds have a format of their own."""
+    """Write times of at least 0. The seconds of a time have a format of their own."""
     seconds = span_us // 1_000_000
     micros = span_us - seconds * 1_000_000
     high, low = np.divmod(micros, 1_000)

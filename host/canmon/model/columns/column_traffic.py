@@ -212,7 +212,7 @@ class _ColumnGaps:
             self._merge()
 
     def _merge(self) -> None:
-        """Add up new counts. This is done rarely, so that many buckets cost little time."""
+        """Add up new counts. The sums are made rarely, so that many buckets cost little time."""
         keys = np.concatenate([self._keys, *(new for new, _ in self._new)])
         counts = np.concatenate([self._counts, *(new for _, new in self._new)])
         order = np.argsort(keys, kind="stable")  # it merges what is sorted already

@@ -32,7 +32,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class NoColumnsError(ValueError):
-    """A log that cannot be columns because it contains CAN FD. It must be read frame by frame."""
+    """A log that cannot be columns because it contains CAN FD. Read the log frame by frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,8 +206,7 @@ class Runs:
         ends: end of each run in `order`, which is the index after its last row.
         numbers: number of each run's identifier.
         fresh: whether a run begins with the first frame of its identifier.
-        gaps_us: gap before each row of `order`. It is 0 before a first frame, and if time goes
-            back.
+        gaps_us: gap before each row of `order`, or 0 before a first frame, and if time goes back.
     """
 
     order: Ints

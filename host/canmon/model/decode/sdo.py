@@ -80,7 +80,7 @@ class _OpenTransfer:
         sent: segment of a download that is not confirmed yet.
         requested_toggle: toggle bit of the requested upload segment.
         taken: toggle bit of the latest accepted segment.
-        block_last: position of the last segment in its block. It is valid after that segment.
+        block_last: position of the last segment in its block, which is valid after that segment.
         block_size: number of segments of a block that the receiver requires, or 0 until the
             receiver has sent it.
         done: whether no more frames are expected.

@@ -119,7 +119,7 @@ class _Stop(NamedTuple):
     """One stop of a curve, which is a column with its values.
 
     Attributes:
-        x: number of the column. It is outside the picture for the neighbours of the visible
+        x: number of the column. The number is outside the picture for the neighbours of the visible
             columns.
         bar: values in the column.
     """
@@ -779,7 +779,7 @@ class LiveGraph:
         return self._collector.series
 
     def add(self, word: CurveSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
-        """Show one more signal. Its values in past frames are also taken."""
+        """Show one more signal. Values of the signal in past frames are also taken."""
         fresh = Collector([word], None, MOST)
         for record, decoded in past:
             fresh.take_decoded(record, decoded)
@@ -860,7 +860,7 @@ class LiveGraph:
         self.axis = next((axis for axis in axes if axis > self.axis), axes[0])
 
     def stretch(self, factor: float) -> None:
-        """Zoom the axis by a factor. Its middle stays where it is."""
+        """Zoom the axis by a factor. The middle of the axis stays where it is."""
         low, high = self._range()
         middle, half = (low + high) / 2, (high - low) / 2 / factor
         self._set_range(middle - half, middle + half)

@@ -116,7 +116,7 @@ class CanLogReader:
                 yield record
 
     def items(self) -> Iterator[Record]:
-        """Read the file. Its marks are only counted."""
+        """Read the file. The marks of the file are only counted."""
         return iter(self)
 
     def _messages(self, apart: _TakeApart | None) -> Iterator[can.Message | BlfBlock]:
@@ -188,7 +188,10 @@ class BlfBlock(NamedTuple):
 
 
 _TakeApart = Callable[[bytes, float], BlfBlock | None]
-"""Function that parses the content of a container. Its log begins at a time in s."""
+"""Function that parses the content of a container.
+
+Its arguments are the content, and the begin of the log in s.
+"""
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
 _OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
@@ -374,7 +377,7 @@ class _AscWriter:
     """Writer that begins at a millisecond of local time. An earlier frame begins a new block.
 
     python-can's own writer dates the file with the time of writing, and writes 5 ms of a date as
-    `.5`. It writes a frame from before the start with its absolute time.
+    `.5`. python-can writes a frame from before the start with its absolute time.
 
     Args:
         file: text file, which is closed with the log.

@@ -53,7 +53,7 @@ class Mark(NamedTuple):
     """An event that is not a frame, at its place among the frames.
 
     Attributes:
-        at_us: time of the event. It is by the clock of this machine if no frame gives the time.
+        at_us: time of the event, or time on the clock of this machine if no frame gives the time.
         event: kind of the event, one of the constants above.
         text: one line of text for display, in ASCII.
         channel: bus of the event, empty for all buses.

@@ -417,7 +417,7 @@ class LogLines:
         return records
 
     def _timed(self, mark: Mark, at: int, records: list[Record]) -> Mark:
-        """Give a mark without a time the time of the frame before it, or after it at the start."""
+        """Give a mark without a time the time of the previous frame, or the next at the start."""
         if mark.at_us:
             return mark
         first_us = records[0].at_us if records else 0
@@ -461,7 +461,7 @@ def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Seque
 
 
 def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
-    """Return the frames that `_USUAL` found. They are made without constructors, for speed."""
+    """Return the frames that `_USUAL` found. Their constructors are not called, for speed."""
     records: list[Record] = []
     add, new, unhex = records.append, tuple.__new__, bytes.fromhex
     second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()

@@ -28,7 +28,7 @@ class LogWriter(Protocol):
         """Add an item other than a frame, if the format can hold it."""
 
     def flush(self) -> None:
-        """Pass all added items to the operating system. They are readable if nothing follows.
+        """Pass all added items to the operating system. The items are readable if nothing follows.
 
         With `in_blocks`, this makes the file larger. Call it rarely.
         """

@@ -248,7 +248,7 @@ _BLOCK_US: Final = 1_000_000
 """Part of a compressed log that is lost if this program is killed."""
 
 _READ_BYTES: Final = 32 << 20
-"""Number of bytes that are read of a file when a recording continues. This takes a few seconds."""
+"""Number of bytes that are read of a file when a recording continues, in a few seconds."""
 
 _USUAL_BYTES: Final = 64
 """Assumed number of bytes of a frame, until there are some frames."""

@@ -101,7 +101,7 @@ class DictionaryTask(Task):
     def watch(self, now_us: int, entry: Entry) -> None:
         """Read an object of the chosen node each second.
 
-        If it is watched already, stop watching it.
+        If the object is watched already, stop watching it.
         """
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER

@@ -136,7 +136,7 @@ class SequenceTask(Task):
         return TomlSequence(text, name, resolve=resolve, condition=condition).parse()
 
     def start(self, sequence: Steps) -> None:
-        """Start a sequence at the next call. It replaces a running sequence."""
+        """Start a sequence at the next call. The new sequence replaces a running sequence."""
         self.events.clear()
         self._begin_us, self._run = None, SequenceRun(sequence)
 
@@ -290,7 +290,7 @@ class SequencePanel(SendingPanel):
     def _read(self) -> Steps | None:
         """Return the sequence of the editor.
 
-        If it is invalid, report the error and go to its place.
+        If the sequence is invalid, report the error and go to the place of the error.
         """
         wrong, area = self.query_one("#mistake", Static), self.query_one(TextArea)
         try:

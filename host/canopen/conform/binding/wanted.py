@@ -20,7 +20,7 @@ PLAIN_OUTPUTS: Final = (0x6200, 0x6300, 0x6320, 0x6410, 0x6411, 0x6412)
 """Outputs of CiA 401 that accept every value. Other profile objects are modes or positions."""
 
 HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
-"""Communication objects that accept every value. They stand for other objects of their size."""
+"""Communication objects that accept every value, and that stand for others of their size."""
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
 _SIZES: Final = (8, 16, 32, 64)

@@ -29,8 +29,8 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
 
     Attributes:
         got: received frame in candump notation, empty if no frame was received.
-        wanted: patterns of the expected frame, one of which must match. It is empty if no frame was
-            expected.
+        wanted: patterns of the expected frame, one of which must match, or an empty tuple if no
+            frame was expected.
     """
 
     def __init__(self, text: str, got: str = "", wanted: Iterable[str] = ()) -> None:

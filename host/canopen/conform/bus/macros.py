@@ -32,8 +32,8 @@ def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
         sdo: SDO client of the drive.
         target: target position (object 607Ah).
         actual: actual position (object 6064h).
-        step: distance from the actual position in counts. It is small, so that no drive makes a
-            jump.
+        step: distance from the actual position in counts. The distance is small, so that no drive
+            makes a jump.
         tolerance: allowed distance from the target, in counts.
         within_ms: longest duration of the move, and longest time that the drive may move before the
             macro.

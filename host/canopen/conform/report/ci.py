@@ -21,7 +21,10 @@ _CHARACTER: Final = 7
 
 
 def badge(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return an SVG badge with the number of passed checks. It is red if a failure is new."""
+    """Return an SVG badge with the number of passed checks.
+
+    The badge is red if a failure is new.
+    """
     judged = [report.count(verdict) for verdict in (CheckVerdict.PASS, CheckVerdict.FAIL)]
     text = f"{judged[0]} of {sum(judged)} pass" if any(judged) else "nothing judged"
     if report.aborted:

@@ -12,7 +12,7 @@ from tickrig.host.canopen.conform.suite import group_titles
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 _VERSION: Final = 1
-"""Version of the format. It changes when a field changes its meaning or disappears."""
+"""Version of the format, which changes when a field changes its meaning or disappears."""
 
 _Object = dict[str, object]
 

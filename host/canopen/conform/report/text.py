@@ -33,8 +33,8 @@ def text_report(
         report: report of the run.
         baseline: baseline of known failures. Only their names are shown.
         show: function that formats frames.
-        again: command that runs one check alone, without the id of the check. It is empty if there
-            is none.
+        again: command that runs one check alone, without the id of the check, or an empty text if
+            there is none.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in overview.unwell(report) if not baseline.knows(result)]

@@ -250,7 +250,7 @@ class DriveDriver:
         self._mode.set_target(target)
 
     def cycle(self) -> Script[None]:
-        """Read values, then write values. This is called in each period."""
+        """Read values, then write values. The node calls this in each period."""
         for item in READ:
             yield from self._read(item)
         self.statusword, self.mode = self._value(_STATUSWORD), self._value(_MODE_DISPLAY)
@@ -279,7 +279,7 @@ class DriveDriver:
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
-        """Enable the drive, and home it if its homing method is not 0. Afterwards it has no mode.
+        """Enable the drive, and home it if its homing method is not 0. The drive then has no mode.
 
         Raises:
             DriveFailed: the drive does not complete in time.

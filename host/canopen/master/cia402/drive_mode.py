@@ -99,7 +99,7 @@ _Write = Callable[[DriveObject, int], Script[None]]
 
 
 class DriveMode:
-    """The actions of a mode in each period. They are used while the drive is in the mode.
+    """The actions of a mode in each period, which are used while the drive is in the mode.
 
     Attributes:
         controlword: bits of the mode in the controlword (6040h).

@@ -114,7 +114,8 @@ def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
     """Add components in files of the user to a server.
 
     Args:
-        server: server that gets the components. They run at the rate of the server's proxies.
+        server: server that gets the components. The components run at the rate of the server's
+            proxies.
         words: components in the form `Logger0=parts.py:Logger`.
 
     Raises:

@@ -167,7 +167,7 @@ class SystemEditor(FramedApp):
                 self.session.close()
 
     def look(self) -> None:
-        """Show the present state. This is called ten times a second, and after each command."""
+        """Show the present state. The app calls this ten times a second, and after each command."""
         if self.session.ended:
             self.exit()
             return

@@ -157,7 +157,7 @@ class PdoScreen(ModalScreen[None]):
     # What is shown, and what came of transfers.
 
     def look(self) -> None:
-        """Show the present state. This is called ten times a second, and after each command."""
+        """Show the present state. The app calls this ten times a second, and after each command."""
         if not self.is_mounted:
             return
         with self._session.lock:

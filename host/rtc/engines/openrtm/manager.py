@@ -33,8 +33,8 @@ class ManagerServant:
     """The servant of a manager. Its methods are the operations of the IDL.
 
     The servant creates and deletes components of the types that its process knows, and ends the
-    process. Operations on modules, other managers and settings are not supported. They return
-    UNSUPPORTED or empty lists.
+    process. Operations on modules, other managers and settings are not supported. Such operations
+    return UNSUPPORTED or empty lists.
 
     Args:
         manager: manager to serve.

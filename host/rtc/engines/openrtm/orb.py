@@ -119,7 +119,7 @@ class Orb:
         self._poa.deactivate_object(self._poa.reference_to_id(reference))
 
     def reference(self, text: str) -> Reference:
-        """Return the reference for an IOR or a corbaloc. This sends no request.
+        """Return the reference for an IOR or a corbaloc, without sending a request.
 
         Raises:
             ValueError: the text is neither an IOR nor a corbaloc.

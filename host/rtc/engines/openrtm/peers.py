@@ -1,4 +1,4 @@
-"""Connectors to components that run elsewhere, as a system file names them. They are kept up."""
+"""Connectors to components that run elsewhere, as a system file names them, and their upkeep."""
 
 from __future__ import annotations
 

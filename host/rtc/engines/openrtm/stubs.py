@@ -120,7 +120,7 @@ def _preprocessor() -> list[str]:
 
 
 def _cache_folder() -> Path:
-    """Return the folder for this user's stubs. It is below a file if there is no such place."""
+    """Return the folder for this user's stubs. If there is no such place, it is below a file."""
     named = os.environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache"), os.devnull
     return next(Path(folder) for folder in named if Path(folder).is_absolute()) / "tickrig"
 

@@ -52,7 +52,7 @@ class _DdsLog:
     are lost.
 
     Attributes:
-        configuration: configuration that makes DDS write into the pipe. It is empty on systems
+        configuration: configuration that makes DDS write into the pipe, or an empty text on systems
             where pipes have no names.
     """
 

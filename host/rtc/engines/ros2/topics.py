@@ -93,7 +93,7 @@ _LOG: Final = log_of(__name__)
 class _Arrivals(Listener):
     """A signal that data arrived.
 
-    DDS calls it in a thread of its own, where nothing else is done.
+    DDS calls the signal in a thread of its own, where nothing else is done.
     """
 
     def __init__(self, notify: Callable[[], None]) -> None:

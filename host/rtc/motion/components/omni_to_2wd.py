@@ -66,7 +66,7 @@ class OmniTo2WD(RtComponent):
         return ReturnCode.RTC_OK
 
     def _take(self, message: iis.TimedPose2D) -> None:
-        """Take a goal, or a point of a path. It replaces earlier goals."""
+        """Take a goal, or a point of a path. The new goal replaces earlier goals."""
         kind = message.id[0] if message.id else None
         if kind not in (position_input.INTERMEDIATE_POINT, position_input.END_POINT):
             self._points = []

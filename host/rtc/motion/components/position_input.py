@@ -32,7 +32,7 @@ class PositionInput(RtComponent):
     Each command waits until the previous command has finished.
 
     The original waits at its console in on_execute. This component does not block. The owner of the
-    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
+    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. The
     configuration is declared and unused, as in the original.
 
     Attributes:
@@ -69,7 +69,7 @@ class PositionInput(RtComponent):
         return not (self._commands or self._running)
 
     def goal(self, pose: Pose) -> None:
-        """Enter a goal. It runs after the earlier commands.
+        """Enter a goal. The goal runs after the earlier commands.
 
         Raises:
             ValueError: a number is invalid.
@@ -97,7 +97,7 @@ class PositionInput(RtComponent):
         self._commands.append(command)
 
     def typed(self, line: str) -> None:
-        """Enter a command as text; see `USAGE`. It runs after the earlier commands.
+        """Enter a command as text; see `USAGE`. The command runs after the earlier commands.
 
         Raises:
             ValueError: the command is unknown, a pose or path is invalid, a file cannot be read, or

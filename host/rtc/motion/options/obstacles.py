@@ -109,7 +109,7 @@ class _WatchedDistance:
         port: port at which distances arrive.
 
     Attributes:
-        free: whether the lane is free. It is False before the first distance.
+        free: whether the lane is free, or False before the first distance.
     """
 
     def __init__(self, port: InPort[TimedDouble]) -> None:
