@@ -15,7 +15,7 @@ from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 _LOW: Final = -(2**31)
 _HIGH: Final = 2**31 - 1
-"""Largest number that ConsoleIn accepts."""
+"""Least and greatest number that ConsoleIn accepts."""
 
 _LENGTH: Final = 10
 """Number of elements of a sequence that SeqOut writes."""

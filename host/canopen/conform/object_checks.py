@@ -102,7 +102,10 @@ _DEFAULTS: Final = "CiA 306-1, DefaultValue; CiA 301 v4.2.0, 7.5.2"
 _COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 _PROFILE_AREA: Final = range(0x6000, 0xA000)
 _NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
-"""Objects of store, restore and program download, which are never written, not even in a test."""
+"""Objects of store, restore and program download.
+
+The tester never writes these objects, not even to provoke a refusal.
+"""
 
 _ERROR_FIELD: Final = 0x1003
 _CONSTANTS: Final = (0x1000, 0x1018)

@@ -277,7 +277,7 @@ FLASH_STATUS: Final = 0x1F57
 STOP: Final = 0
 _START: Final = 1
 _CLEAR: Final = 3
-"""Command of program control (1F51h:01) that clears the program."""
+"""Commands of program control (1F51h:01)."""
 
 LOOK_US: Final = 100_000
 _LOOKS: Final = 600

@@ -201,7 +201,7 @@ class NodePhase(Enum):
 
 _READY: Final = NodePhase.READY
 _LISTENING: Final = NodePhase.LISTENING
-"""Value that is looked up once, because a look-up takes 0.1 us for each node in each period."""
+"""Values that are looked up once. A look-up takes 0.1 us for each node in each period."""
 
 _WATCHED: Final = (NodePhase.READY, NodePhase.DUPLICATE)
 """Phases in which the server expects heartbeats."""

@@ -156,7 +156,7 @@ def _u32(value: int) -> bytes:
 _EMERGENCY: Final = range(0x080, 0x100)
 _SDO_RESPONSES: Final = range(0x580, 0x600)
 _ERROR_CONTROL: Final = range(0x700, 0x780)
-"""CAN-IDs of error control by node-ID. Node 0 does not exist."""
+"""CAN-IDs that nodes send, by node-ID. Node 0 does not exist."""
 
 _QUIET_US: Final = 1_000_000
 """Time without frames after which another master is reported again."""

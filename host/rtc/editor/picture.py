@@ -63,7 +63,7 @@ _Line = tuple[tuple[str, str], ...]
 
 _MOST_BOX: Final = 26
 _LEAST_BOX: Final = 9
-"""Width of a box with its frame in cells."""
+"""Largest and least width of a box with its frame in cells."""
 
 _STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
 _FRAMES: Final = {"ACTIVE": "green", "INACTIVE": "cyan", "ERROR": "bold red"}

@@ -240,7 +240,7 @@ class GoalInterface(RtComponent):
 
 PASSED: Final = 0
 STOPPED: Final = 1
-"""Value of `id[0]` in a running state. IIS does not define how the flag is carried."""
+"""Values of `id[0]` in a running state. IIS does not define how the flag is carried."""
 
 _LEAST_WAY_M: Final = 1e-3
 """Distance in m between way points below which there is no line."""

@@ -151,7 +151,7 @@ def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> 
 
 WIDTH: Final = 60
 _HEIGHT: Final = 16
-"""Height of a map in cells."""
+"""Width and height of a map in cells."""
 _MARGIN: Final = 0.08
 """Share of the larger side that is left free around the map."""
 _SMALLEST_M: Final = 0.5

@@ -112,7 +112,7 @@ _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
 _STOPPED: Final = 5
 _STOPPED_US: Final = 250_000
-"""Duration without frames at the end of a log after which the frames count as stopped."""
+"""Number of periods, and duration, without frames at the end of a log that mean a stop."""
 _SURE_FRAMES: Final = 50
 _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100

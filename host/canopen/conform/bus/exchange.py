@@ -53,7 +53,7 @@ class Disturbed(Exception):  # noqa: N818 - what the check was
 
 FIRST_LINES: Final = 40
 LAST_LINES: Final = 160
-"""Number of lines that are kept as evidence of a long check."""
+"""Numbers of first and last lines that are kept as evidence of a long check."""
 LEFT_OUT: Final = "lines left out"
 """The end of the remark that replaces the omitted lines."""
 

@@ -17,7 +17,7 @@ from tickrig.wire.rtc_types.rtc import Time, TimedState
 START_POINT: Final = 100
 INTERMEDIATE_POINT: Final = 101
 END_POINT: Final = 102
-"""Value of `id[0]` in the points of a path. A goal has none."""
+"""Values of `id[0]` in the points of a path. A goal has none."""
 
 _DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
 """Default of `PositionInput.defined_path`, which is a square of 1 m, back to the origin."""
