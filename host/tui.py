@@ -325,7 +325,7 @@ class KeyFooter(Widget):
             yield Key(binding.key, self.app.get_key_display(binding), "commands")
 
 
-# What all full-screen programs do alike: how they end, and how they explain their keys.
+# The common part of full-screen programs: their end, and the help on their keys.
 #
 # No program waits for its terminal. Textual queues thirty texts and then blocks its event loop,
 # with all that listens for keys and signals; here a thread writes (`TerminalOutput`), and what is

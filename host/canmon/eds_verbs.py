@@ -137,7 +137,7 @@ def _write(
         write_whole(report, junit("canmon eds check", names, cases))
 
 
-# The verb `eds fix`: fix errors that need no knowledge of the device.
+# The verb `eds fix`, which fixes errors that need no knowledge of the device.
 
 
 _LEFT: Final = 1

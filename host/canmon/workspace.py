@@ -204,7 +204,7 @@ def _are_tables(value: object) -> bool:
     )
 
 
-# What a workspace keeps: buses and files of nodes, and the settings of all panels.
+# Content of a workspace: buses, files of nodes, and the settings of all panels.
 #
 # `[bus]` and `[nodes.3]` of a workspace; what the command line says goes before.
 # Paths in the file are taken from its own folder.

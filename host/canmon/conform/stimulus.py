@@ -31,7 +31,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.errors import FieldError
 
-# Sets inputs of an emulated device by signal name (docs/reference/bench/control.md).
+# Stimuli that set inputs of an emulated device by signal name (docs/reference/bench/control.md).
 
 _HEX = "hex:"
 """Prefix for the bytes of an octet string or a domain."""

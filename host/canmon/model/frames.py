@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
 
 
-# What a monitor takes in: frames and lines of serial ports, with when and where.
+# The input of a monitor: frames and lines of serial ports, with their times and places.
 
 ARROWS: Final = {True: ">", False: "<"}
 """Signs for the direction of a line, sent to the device or received from it."""

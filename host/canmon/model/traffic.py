@@ -381,7 +381,7 @@ class BitRates(NamedTuple):
 NO_RATES: Final = BitRates()
 
 
-# What error frames say about a bus and about our own controller.
+# Information in error frames about a bus and about our own controller.
 
 _OVERFLOW: Final = can.ControllerFlag.RECEIVE_OVERFLOW
 _PASSIVE: Final = can.ControllerFlag.RECEIVE_PASSIVE | can.ControllerFlag.TRANSMIT_PASSIVE

@@ -36,7 +36,7 @@ else:  # slow; seldom wanted; numpy
     services = LazyModule("tickrig.host.canmon.model.decode.services")
 
 
-# What frames mean, and which of them are wanted.
+# Decoding and filtering of frames.
 
 DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 """A frame or a line of a serial port, and its meaning if it is decoded."""
@@ -102,7 +102,7 @@ class FilteredDecoder:
         return said
 
 
-# What `dump` prints of each frame: candump's lines, its log format, JSON or CSV.
+# Output of `dump` for each frame: candump's lines, its log format, JSON or CSV.
 
 _Printer = Callable[["AnyRecord", "Decoded | None"], str]
 """Function that prints a frame, or a line of a serial port, with its meaning if it is known."""

@@ -48,7 +48,7 @@ else:  # numpy, threads, python-can, pyserial: imported for what wants them
     live_source = LazyModule("tickrig.host.canmon.sources.live_source")
 
 
-# Where frames come from: buses, log files or standard input, under one face.
+# Sources of frames with one interface: buses, log files or standard input.
 
 _Taken_co = TypeVar("_Taken_co", covariant=True)
 

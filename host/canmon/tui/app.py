@@ -322,7 +322,7 @@ def _write_png(path: Path, strips: Sequence[Strip]) -> None:
         image.save(beside, "PNG")
 
 
-# What is replaced as a whole when buses or files change.
+# The parts that are replaced as a whole when buses or files change.
 
 
 class _Work(NamedTuple):

@@ -60,7 +60,7 @@ else:  # numpy; decoders
     learnt = LazyModule("tickrig.host.canmon.model.check.learnt")
 
 
-# What `check` finds, shown as it comes: as text, or as objects in JSON.
+# Findings of `check`, shown as they occur, as text or as objects in JSON.
 
 
 class _FindingPrinter:
@@ -419,7 +419,7 @@ def command(  # noqa: PLR0913 - options
         raise _NothingJudged(unjudged)
 
 
-# What is wrong without a rule.
+# Findings without given rules.
 
 _MOST_FRAMES: Final = 20_000_000
 """Number of frames of a bus that are kept, which take 700 MB."""

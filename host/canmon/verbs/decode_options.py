@@ -134,7 +134,7 @@ def read_filter(text: str | None) -> filters.Filter | None:
         return filters.parse_filter(text)
 
 
-# What verbs that take SOURCE words share.
+# Common parts of verbs with SOURCE words.
 
 _SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names

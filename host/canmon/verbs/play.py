@@ -34,7 +34,7 @@ else:  # python-can is slow
     bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
-# What of a log is sent where and when.
+# Frames of a log with the bus and the time of sending.
 
 _FOREVER: Final = 0
 """Value of `loops` for a replay without an end."""

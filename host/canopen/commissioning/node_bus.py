@@ -137,7 +137,7 @@ class NodeBus:
             self.states[frame.can_id - ERROR_CONTROL_COB_ID] = state
 
 
-# Which nodes are on a bus: read the device type of each node-ID, which changes nothing.
+# The scan for nodes on a bus. It reads the device type of each node-ID and changes nothing.
 
 _NODE_IDS: Final = range(1, 128)
 _DEVICE_TYPE: Final = 0x1000

@@ -20,7 +20,7 @@ Address = tuple[int, int]
 ANSWER_MS: Final = 1_000
 """Time that a check waits for an answer if the check sets no time. CiA 301 defines none."""
 
-# What a step does on the bus.
+# Actions of steps on the bus.
 
 
 @dataclass(frozen=True, slots=True)

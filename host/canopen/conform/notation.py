@@ -105,7 +105,7 @@ def _resolve_address(target: str, names: _Names) -> Address:
     return int(match[1], 16), int(match[2], 16)
 
 
-# What the arguments of macros tell before they are played: what they write, and how long they last.
+# Information in the arguments of macros: the objects that they write, and their duration.
 
 _DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
 MAP: Final = "map"

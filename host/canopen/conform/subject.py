@@ -32,7 +32,7 @@ from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 _BIT_7: Final = 0x80
 """Bit 7, which no node-ID has because node-IDs end at 127."""
 
-# Whether an EDS describes the device that answers, or another one.
+# Check whether an EDS describes the device that answers.
 
 TOLD: Final = {"device type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x1018, 2)}
 """Properties that distinguish devices, under the names in `Subject.about`."""

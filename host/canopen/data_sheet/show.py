@@ -12,7 +12,7 @@ from tickrig.wire.canopen.eds.eds_value import format_value, parse_number, plain
 from tickrig.wire.canopen.eds.eds_writer import access_type
 from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescription
 
-# How values of an EDS are displayed.
+# Display of the values of an EDS.
 
 
 def _access_text(row: EntryDescription) -> str:

@@ -59,7 +59,7 @@ class Joystick(RtComponent):
         return ReturnCode.RTC_OK
 
 
-# What bases on wheels have in common: a velocity in, wheel speeds out, a pose out.
+# The common part of bases on wheels: a velocity in, wheel speeds out, a pose out.
 
 _OK: Final = ReturnCode.RTC_OK
 

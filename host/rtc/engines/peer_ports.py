@@ -23,7 +23,7 @@ from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode
 from tickrig.wire.rtc_types.idl import Struct
 
-# Whether the peer of a connector answers.
+# The state of the peer of a connector.
 
 _LOG: Final = log_of(__name__)
 

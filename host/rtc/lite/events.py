@@ -12,7 +12,7 @@ from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 
-# When to send a PING, when a device is lost (DECISION L14), and how PINGs went.
+# Schedule of PINGs, loss of a device (DECISION L14), and statistics of PINGs.
 
 _SEQUENCE: Final = range(1, 256)
 """Numbers of PINGs, in which 0 is skipped."""

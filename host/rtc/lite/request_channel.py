@@ -21,7 +21,7 @@ from tickrig.wire.rtc_lite.frame import (
 )
 from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
-# What differs from one proxy to another, and what the paper leaves open.
+# Settings that differ between proxies, or that the paper does not define.
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,7 +118,7 @@ def set_latency(chain: MotionChain, response_s: float) -> None:
         component.configuration.set("latency", latency, "tuned")
 
 
-# How well a cart drove, as lines of text.
+# The quality of a drive, as lines of text.
 
 
 def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: VelocityLimits) -> list[str]:

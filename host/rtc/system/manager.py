@@ -91,7 +91,7 @@ def _installed_type(name: str) -> type[RtComponent]:
     return found
 
 
-# What a system has to do with components that run elsewhere: an engine looks after it.
+# Connections of a system to components that run elsewhere, which an engine maintains.
 
 
 @dataclass(frozen=True, slots=True)

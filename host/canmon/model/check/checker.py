@@ -264,7 +264,7 @@ def unjudged(
     return Unjudged(none, tuple(notes))
 
 
-# A checker whose frames are decoded where a rule asks what they mean.
+# A checker that decodes frames if a rule needs decoded frames.
 
 
 # The frames around findings.

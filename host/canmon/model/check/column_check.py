@@ -208,12 +208,12 @@ class _BusSelection:
 
     def _add(self, number: int, selection: FrameSelection) -> None:
         below_us, above_us, first_bytes, firsts = selection
-        # A selection that says nothing asks for all frames.
+        # A selection without attributes selects all frames.
         self._all[number] |= selection == FrameSelection()
         self._firsts[number] |= firsts
         self._bytes[number, sorted(first_bytes)] = True
         if below_us is not None:
-            # The widest of what several rules ask for; each rule still judges for itself.
+            # The union of the selections of several rules. Each rule still judges by itself.
             self._below_us[number] = max(self._below_us[number], below_us)
         if above_us is not None:
             self._above_us[number] = min(self._above_us[number], above_us)

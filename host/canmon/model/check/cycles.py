@@ -131,7 +131,7 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
     missing: list[tuple[int, int]] = []
     extra: list[int] = []
     for place, level in enumerate(levels):
-        # Where the period changes, a window belongs to both.
+        # At a change of the period, a window belongs to both periods.
         inner = level._replace(
             begin=level.begin + _WINDOW * (place > 0),
             end=level.end - _WINDOW * (place < len(levels) - 1),

@@ -14,7 +14,7 @@ from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.instant import NEVER
 
-# The frames that a rule speaks of.
+# The events of a rule.
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def _said(decoded: Decoded) -> str:
     return f"{decoded.kind}{node}: {decoded.text}".removesuffix(": ")
 
 
-# What is demanded of frames, while the scope of its rule holds.
+# Demands on frames, which apply in the scope of their rule.
 
 
 class RuleBreach(NamedTuple):
@@ -131,7 +131,7 @@ class RuleDemand:
         return ()
 
 
-# Demands on how often something comes.
+# Demands on the frequency of frames.
 
 MOST_COUNTED: Final = 10_000
 """Largest number of frames that a rule may allow in a span, because their times are kept."""
@@ -386,7 +386,7 @@ class Toggle(RuleDemand):
         return f"{_said(decoded)}: toggle {1 - toggle} is right" if toggle == last else None
 
 
-# Demands on when something comes.
+# Demands on the time of frames.
 
 
 class Every(RuleDemand):

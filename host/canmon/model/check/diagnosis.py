@@ -375,7 +375,7 @@ class _BusJudge:
         node = None if ident is None else node_of(ident)
         self._hits.append(Hit(rule, node, ident, text, tuple(map(int, rows)), n))
 
-    # What holds for any bus
+    # Rules for any bus
 
     def _time(self) -> None:
         at_us, rows = self._bus.at_us, self._backward
@@ -769,7 +769,7 @@ class _BusJudge:
                 )
             )
 
-    # What is usual
+    # The usual traffic
 
     def summary(self) -> learnt.BusSummary:
         """Return the usual traffic on the bus, after `faults` was called."""

@@ -317,7 +317,7 @@ class BusEvents:
             return  # many nodes start themselves (1F80h)
         elif state != before:
             wanted = None if command is None else command[1]
-            # Who records without what it sends itself, has no command at all.
+            # A recorder that omits its own frames records no NMT command.
             unseen = state == nmt.NmtState.OPERATIONAL and not self.commanded
             self.cuts.append(Cut(at_us, node))
             if state != wanted and not one.reset and not unseen:

@@ -37,7 +37,7 @@ from tickrig.wire.can import ErrorFrame
 # A rule written as an expression, checked against decoded frames one by one.
 
 
-# When a rule is in force: after something, before it, or while a condition holds.
+# The scope of a rule: after an event, before an event, or while a condition is true.
 
 
 class RuleScope:
@@ -223,7 +223,7 @@ class ExpressionRule:
             decoded = _with_slices(record, decoded, self._slices)
         if self._looks:
             self._look(record, decoded)
-        # without a scope nothing is asked once it runs: a third of the time of a rule
+        # without a scope nothing is called while it runs, which saves a third of the time of a rule
         if (self._scopes or not self._running) and not self._in_force(record, decoded):
             return None
         text = self._demand.judge(record, decoded)
@@ -351,7 +351,7 @@ def _within(low: str, high: str) -> Callable[[Signal], bool]:
     return holds
 
 
-# What stands behind a demand: times, spans, counts and sets of values.
+# Arguments of a demand: times, spans, counts and sets of values.
 
 
 class RuleError(FilterError):
@@ -478,7 +478,7 @@ class _QuantityParser(SliceParser):
         return repr(self._next.text) if self._next.text else "the end"
 
 
-# EMCYs that take an error back: where errors are looked for they are none.
+# EMCYs that clear an error, which do not count as errors.
 
 _EMCY: Final = "emcy"
 _OTHERS: Final = frozenset(["not", "!", "!="])

@@ -533,7 +533,7 @@ def _single(decode: Callable[[bytes], Decoded], length: int) -> _Write:
     return write
 
 
-# What frames in columns mean, as frame by frame; needs numpy.
+# The meanings of frames in columns, the same as frame by frame; needs numpy.
 
 
 # The node board of a log in blocks: only frames that can change it are decoded; needs numpy.

@@ -250,7 +250,7 @@ def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     return np.where(times_us < EXACT_US, times_us, wide).astype(np.int16)
 
 
-# How often each payload bit changes, block after block, as in `BitMemory`; needs numpy.
+# Change counts of payload bits, block after block, as in `BitMemory`; needs numpy.
 
 _Payloads = npt.NDArray[np.uint64]
 

@@ -133,7 +133,7 @@ def write_entry(entry: tuple[int, int] | None) -> str:
     return "an unknown object" if entry is None else f"{entry[0]:04X}h:{entry[1]:02X}"
 
 
-# What a frame says, once it is decoded.
+# The meaning of a decoded frame.
 
 EDS: Final = "eds"
 SEEN: Final = "seen"

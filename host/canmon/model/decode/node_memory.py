@@ -26,7 +26,7 @@ from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 from tickrig.wire.errors import FieldError
 
-# What is known of an object: its name, type and unit, and who says so; states of a drive.
+# Knowledge about an object: its name, type and unit, with their source; states of a drive.
 
 
 _STATUSWORD_BITS: Final = {

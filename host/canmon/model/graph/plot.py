@@ -29,7 +29,7 @@ from tickrig.host.canmon.model.frames import Record, Stamp, date_text, seconds_t
 from tickrig.host.canmon.model.graph.series import LEAST_US, Collector, CurveSpec, Series, View
 from tickrig.host.text.page_text import one_line
 
-# What every picture of curves needs: decimated curves and the ranges of the axes.
+# Data for every picture of curves: decimated curves and the ranges of the axes.
 
 
 _SMALLEST: Final = 1e-200

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from io import BufferedReader
 
 
-# What a log says between its frames: what is missing there, and why it was recorded.
+# Marks between the frames of a log: missing frames, and the reason of a recording.
 
 
 DROP: Final = "drop"
@@ -124,7 +124,7 @@ def _plain(text: str) -> str:
     return " ".join(text.split()).encode("ascii", "backslashreplace").decode("ascii")
 
 
-# What a log holds besides frames: counted, so that nothing is lost silently.
+# Other items than frames in a log, which are counted so that no loss stays unreported.
 
 _KEPT: Final = 5
 """Number of bad lines that are kept. Further bad lines are only counted."""

@@ -408,7 +408,7 @@ def _usual(order: str) -> _Usual:
 
 # Frames in captures of Wireshark, tshark and tcpdump: pcapng, and pcap before it.
 #
-# Which of the two a file is, its first bytes tell, not its name.
+# The first bytes of a file show whether it is pcapng or pcap. The name does not matter.
 
 _PCAP: Final = {
     bytes.fromhex("d4c3b2a1"): ("<", 1),

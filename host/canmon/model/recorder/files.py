@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
 
 
-# What a recording shall be: its files, their sizes, and what it waits for.
+# The plan of a recording: its files, their sizes, and its trigger.
 
 
 _MIN_BYTES: Final = 64 << 10

@@ -143,7 +143,7 @@ class RuleTrigger:
 # files.py has parts, limits and the index; a mark that waited in the ring is written into
 # the file but not into the index again (`mark_again`), which got it when it happened.
 
-# What came before a trigger.
+# The frames before a trigger.
 
 _Entry = Record | Mark
 

@@ -189,7 +189,7 @@ class PictureView(LineView, inherit_bindings=False):
         self.post_message(self.Pointed(event.x))
 
 
-# What every tab of the monitor is: the contract between the frame and its panels.
+# The base class of tabs, which is the contract between the app and its panels.
 
 
 def read_help(module: str) -> str:

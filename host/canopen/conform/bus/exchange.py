@@ -92,7 +92,7 @@ class Evidence:
         return tuple(FrameLine(at_us, way, str(what)) for at_us, way, what in lines)
 
 
-# Whether frames arrive at the expected rate.
+# Check of the period of frames.
 
 MS_US: Final = 1_000
 PERIOD_TOLERANCE: Final = 0.05
@@ -127,7 +127,7 @@ def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: 
     return ""
 
 
-# How many nodes answer to one node-ID, determined from the answers to their requests.
+# The number of nodes that answer to one node-ID, determined from the answers to requests.
 
 _LEAST: Final = 3
 """Number of requested objects from which the number of answers is significant."""
@@ -144,7 +144,7 @@ class Presence(Enum):
     TWO = 2
 
 
-# How much of the bus the tester may use, and how much others use.
+# The load that the tester may cause, and the load by other nodes.
 
 ASSUMED_BIT_RATE: Final = 125_000
 """Default bit rate in bit/s. The low value keeps the load limit valid on any faster bus."""

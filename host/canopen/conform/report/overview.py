@@ -28,7 +28,7 @@ from tickrig.host.text.page_text import one_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
-# Where to look if a check failed: the part of a firmware that has such faults.
+# Hints for failed checks: the part of a firmware that has such faults.
 
 _HINTS: Final[Mapping[str, str]] = {
     "NMT": "the table of NMT states: which command leads where, and what it resets",

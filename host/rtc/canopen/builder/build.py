@@ -122,7 +122,7 @@ def _pdo(port: rtc_canopen.PlacedPort) -> str:
     return PDO.format(_pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")
 
 
-# What rtc-canopen-builder does, once its options are read.
+# The work of rtc-canopen-builder after its options are read.
 
 
 def run_builder(

@@ -188,7 +188,7 @@ def _close(link: CanLink) -> None:
     link.close()
 
 
-# What rtc-canopen-server does, once its options are read.
+# The work of rtc-canopen-server after its options are read.
 
 _QUICK_US: Final = 2_000
 """Longest time that a call of an engine waits for the bus."""

@@ -154,7 +154,7 @@ class PdoScreen(ModalScreen[None]):
         self.view.focus()
         self.look()
 
-    # What is shown, and what came of transfers.
+    # The display, and the results of transfers.
 
     def look(self) -> None:
         """Show the present state. The app calls this ten times a second, and after each command."""

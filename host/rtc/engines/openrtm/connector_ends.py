@@ -100,7 +100,7 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
     }
 
 
-# Our end of a connector with a peer: what it tells the peer, and what it needs of it.
+# Our end of a connector with a peer: the properties for the peer, and those from the peer.
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ class ConnectorEnd(ABC):
         return found._unchecked_narrow(kind)
 
 
-# InPortCdr and OutPortCdr: what calls them at a peer, and what answers here.
+# InPortCdr and OutPortCdr: clients of a peer's objects, and servants for the peer.
 
 _LOG: Final = log_of(__name__)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-# Which reference stands for which component and execution context.
+# References of components and execution contexts.
 
 
 @dataclass(slots=True)

@@ -29,7 +29,7 @@ from tickrig.host.rtc.engines.ros2.message_types import dds_name, message_type, 
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.host.text.log import log_of
 
-# What Cyclone DDS has to say: it would write a line to standard error for each message.
+# Log messages of Cyclone DDS, which would write a line to standard error for each message.
 
 _FATAL: Final = 1
 """Log category for messages on standard error (dds/ddsrt/log.h)."""
@@ -195,7 +195,7 @@ def _place(interface: str) -> tuple[str, str]:
     return f'name="{interface}"', ""
 
 
-# Who else writes and reads our topics, and in a way that is not ours.
+# Other writers and readers of our topics, and incompatible ones among them.
 
 _LOOK_S: Final = 0.5
 MATCH_S: Final = 5.0

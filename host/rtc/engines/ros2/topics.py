@@ -17,7 +17,7 @@ from tickrig.host.rtc.states import PortStatus
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
-# What writes the messages of one port to its topic, in the thread of the engine.
+# The writer of the messages of one port to its topic, in the thread of the engine.
 
 _WRITER_LOG: Final = log_of(__name__)
 

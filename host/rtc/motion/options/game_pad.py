@@ -15,7 +15,7 @@ from tickrig.host.rtc.device_component import DeviceComponent
 from tickrig.host.rtc.motion.ports import write_velocity
 from tickrig.wire.rtc_types import iis
 
-# What `GamePad` reads: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal.
+# Inputs of `GamePad`: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal.
 
 
 class _GamePadDevice(Protocol):
