@@ -79,7 +79,7 @@ FENCES: Final[tuple[Object, ...]] = (
 class SdoRequest:
     """Step that sends an SDO request. The result is the response.
 
-    Raises SdoTimeout if no response arrives.
+    SdoTimeout is raised if no response arrives.
 
     Attributes:
         goes_on: whether the request continues a transfer of the server. Otherwise the request

@@ -42,7 +42,7 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
 
 
 def download(index: int, sub: int, data: bytes) -> Script[None]:
-    """Write an object. Raises as `upload` does."""
+    """Write an object. The errors are those of `upload`."""
     if 1 <= len(data) <= EXPEDITED_BYTES:
         request = sdo.DownloadInitiateRequest(index, sub, data, len(data))
     else:

@@ -467,7 +467,7 @@ class ExecutionContexts:
 
     @property
     def due_us(self) -> int:
-        """Begin of the next period of a context, or `NEVER` while no context runs."""
+        """Start of the next period of a context, or `NEVER` while no context runs."""
         if not self._known:
             self._known = True
             self._due_us = min((context.due_us for context in self._contexts), default=NEVER)
@@ -525,7 +525,7 @@ class ExecutionContext:
             microseconds.
 
     Attributes:
-        due_us: begin of the next period, or `NEVER` while the context is stopped.
+        due_us: start of the next period, or `NEVER` while the context is stopped.
         rate_hz: number of periods per second.
         period_us: length of a period.
         running: whether the context runs, which is True between start and stop.

@@ -466,7 +466,7 @@ class BusSecond(NamedTuple):
     """A second of a bus.
 
     Attributes:
-        at_us: begin of the second.
+        at_us: start of the second.
         bits: number of bits of the frames that ended in this second.
     """
 
@@ -541,7 +541,7 @@ class Load:
 
 
 def _window_begin(first_us: int, at_us: int) -> int:
-    """Return the begin of the window that contains a time."""
+    """Return the start of the window that contains a time."""
     return at_us - (at_us - first_us) % WINDOW_US
 
 

@@ -265,7 +265,7 @@ class LogCut:
     """The wanted part of a log. By default, it is the whole log.
 
     Attributes:
-        begin: begin of the part, or None for the first frame of the log.
+        begin: start of the part, or None for the first frame of the log.
         end: end of the part, or None for the last frame of the log.
         earlier: function that is called with each frame before the part, so that a decoder can
             learn from it.

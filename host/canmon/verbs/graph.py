@@ -76,7 +76,7 @@ class _GraphRequest:
 
     Attributes:
         files: files to write.
-        begin: begin of the view, or None for all.
+        begin: start of the view, or None for all.
         end: end of the view, or None for all.
         at: time of the cursor, or None for none.
         ranges: ranges of axes.
@@ -372,7 +372,7 @@ def _missed(series: Sequence[Series], view: View) -> str:
 
 
 def _title(source: str, view: View, title: str) -> str:
-    """Return the title of a picture, with its content, its source, and the begin of its time."""
+    """Return the title of a picture, with its content, its source, and the start of its time."""
     begun = f"0 s is {date_text(view.origin_us)}" if view.origin_us >= DATED_US else ""
     name = Path(source).name if Path(source).is_file() else source
     return ", ".join(filter(None, [one_line(title), one_line(name), begun]))

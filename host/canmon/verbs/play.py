@@ -65,12 +65,12 @@ class ReplayPlan:
         route: function that returns the bus on which to send the frames of a recorded bus, or None
             to omit them.
         speed: factor of the speed, or 0 for no pauses.
-        from_us: begin of the span to send, counted from the first frame.
+        from_us: start of the span to send, counted from the first frame.
         to_us: end of the span to send, counted from the first frame, or None for the end of the
             log.
         loops: number of loops, or `_FOREVER` to repeat until the replay is stopped. A loop begins
             where the previous loop ends, which is at `to_us`, or else at the last frame. A loop
-            begins at least 1 ms after the begin of the previous loop.
+            begins at least 1 ms after the start of the previous loop.
 
     Attributes:
         left_out: number of omitted frames in the span, which are error frames and frames of other
@@ -115,7 +115,7 @@ class ReplayPlan:
             begin_us = max(end_us, begin_us + _LEAST_LOOP_US)
 
     def _span(self) -> Iterator[tuple[int, Record]]:
-        """Yield the frames in the span, with their times after the begin of the span."""
+        """Yield the frames in the span, with their times after the start of the span."""
         first_us: int | None = None
         latest_us = 0
         for record in self.log:

@@ -148,7 +148,7 @@ class LssMaster:
     def address(self) -> LssAddress:
         """Return the address of the only slave in configuration.
 
-        Raises as `configure_node_id` does.
+        The errors are those of `configure_node_id`.
         """
         return LssAddress(
             *(
@@ -182,7 +182,10 @@ class LssMaster:
         self._configure(message(LssCommand.CONFIGURE_NODE_ID, node_id))
 
     def configure_bit_rate(self, bit_rate: int) -> None:
-        """Set the bit rate in bit/s, one of `INDICES`. Raises as `configure_node_id` does."""
+        """Set the bit rate in bit/s, one of `INDICES`.
+
+        The errors are those of `configure_node_id`.
+        """
         number = STANDARD_TABLE | INDICES[bit_rate] << 8
         self._configure(message(LssCommand.CONFIGURE_BIT_TIMING, number))
 
@@ -191,7 +194,10 @@ class LssMaster:
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.ACTIVATE_BIT_TIMING, delay_ms))
 
     def store(self) -> None:
-        """Make the slave store node-ID and bit rate. Raises as `configure_node_id` does."""
+        """Make the slave store node-ID and bit rate.
+
+        The errors are those of `configure_node_id`.
+        """
         self._configure(message(LssCommand.STORE))
 
     def _scan(self, request: FastScan, wait_us: int) -> bool:

@@ -49,7 +49,7 @@ class NodeBus:
         return self._link.now_us
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Send a data frame. Raises LinkClosed if the bus is gone."""
+        """Send a data frame. Raise LinkClosed if the bus is gone."""
         self._link.send((data_frame(can_id, data),))
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
@@ -125,7 +125,7 @@ class NodeBus:
         return self.run(node_id, upload(index, sub, size))
 
     def write(self, node_id: int, index: int, sub: int, data: bytes, timeout_us: int = 0) -> None:
-        """Write an object. Raises as `read` does."""
+        """Write an object. The errors are those of `read`."""
         self.run(node_id, download(index, sub, data), timeout_us)
 
     def _guard(self, can_id: int) -> None:
@@ -195,7 +195,7 @@ class NetworkScan:
     def run(self) -> list[NodeFound]:
         """Return the nodes that answered or sent a frame, by node-ID.
 
-        Raises LinkClosed without a bus.
+        Raise LinkClosed without a bus.
         """
         for first in range(1, 128, _AT_ONCE):
             for node_id in _NODE_IDS[first - 1 : first - 1 + _AT_ONCE]:

@@ -175,7 +175,7 @@ class Program:
         self._bus, self._node_id, self._number, self._say = bus, node_id, number, say
 
     def status(self) -> ProgramStatus:
-        """Read the status of the program. Raises SdoFailed if the node has no object 1F51h."""
+        """Read the status of the program. Raise SdoFailed if the node has no object 1F51h."""
         control = self._read(boot_slave.CONTROL)
         return ProgramStatus(
             control,

@@ -77,7 +77,7 @@ def _sample_value(name: str, attribute: str, bound: BoundObject) -> str:
     Args:
         name: name of the object in the check, used in the message.
         attribute: name of the wanted value. `new` and `other` are two allowed values, if possible
-            neither the original value nor the value at the begin of checks. `old` is the original
+            neither the original value nor the value at the start of checks. `old` is the original
             value. `low` and `high` are the limits of the object, `below` and `above` are values
             beyond them. `map` is the mapping entry of the object, `longmap` is a mapping entry of
             twice the length.

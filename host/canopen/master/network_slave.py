@@ -35,7 +35,7 @@ class NetworkSlave:
             boot-up.
         steps: steps of the latest boot-up, each with its time.
         emergencies: error codes of the slave's EMCY messages, in the order of arrival.
-        began_us: begin of the latest boot-up.
+        began_us: start of the latest boot-up.
         lost: number of failures of error control.
         events: losses of the slave, and its messages after a loss, each with its time.
     """

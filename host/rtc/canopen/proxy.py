@@ -178,7 +178,7 @@ class _SdoPortLayout:
     struct: type[Struct]
 
     def read(self) -> Script[tuple[bytes, ...]]:
-        """Read all elements in their order. Raises as `upload` does."""
+        """Read all elements in their order. The errors are those of `upload`."""
         elements = []
         for sub in self.subs:
             elements.append((yield from upload(self.index, sub, self.kind.data_type.size)))
@@ -196,7 +196,7 @@ class _SdoPortLayout:
         return pdo_layout.sequence_of(kind, tm, value) if self.kind.many else kind(tm, value)
 
     def write(self, elements: Sequence[bytes]) -> Script[None]:
-        """Write all elements in their order. Raises as `download` does."""
+        """Write all elements in their order. The errors are those of `download`."""
         for sub, data in zip(self.subs, elements, strict=True):
             yield from download(self.index, sub, data)
 

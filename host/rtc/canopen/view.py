@@ -268,7 +268,7 @@ class ServerView:
     ) -> PendingTransfer[None]:
         """Change PDOs of a device, and set up the device again.
 
-        Raises ServerRefused if that is not possible now.
+        Raise ServerRefused if that is not possible now.
 
         Args:
             node_id: node-ID of the node.

@@ -116,7 +116,7 @@ class PeerEnd:
 
     @property
     def options(self) -> connector.ConnectorOptions:
-        """Options in the properties. Raises RtcRefused if they are impossible."""
+        """Options in the properties. RtcRefused is raised if they are impossible."""
         lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
         if lengths.isdisjoint(self.properties):
             return connector.ConnectorOptions.parse(

@@ -462,7 +462,7 @@ class NoLostHeartbeat(Rule):
         return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS
 
     def begin(self, at_us: int, /) -> None:
-        """Record the begin of listening."""
+        """Record the start of listening."""
         self._begin_us = at_us
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:

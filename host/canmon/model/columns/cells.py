@@ -187,7 +187,7 @@ def widened(rows: Cells, width: int) -> Cells:
 
 @lru_cache(1)
 def _begins() -> npt.NDArray[np.uint32]:
-    """Return texts of four digits at the begin of a number, and from 10,000 on, as later digits."""
+    """Return texts of four digits at the start of a number, and from 10,000 on, as later digits."""
     numbers, tens = np.arange(_RADIX)[:, np.newaxis], np.array([1_000, 100, 10, 1])
     digits = (numbers // tens % 10 + ord("0")).astype(np.uint8)
     rows = np.concatenate((np.where(numbers >= tens, digits, np.uint8(0)), digits))

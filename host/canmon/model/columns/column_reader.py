@@ -43,7 +43,7 @@ _FRAMES: Final = (1, 86)
 
 _SIGNATURE: Final = int.from_bytes(b"LOBJ", "little")
 _PADDED: Final = 4
-"""Largest distance from the end of an object to the begin of the next object."""
+"""Largest distance from the end of an object to the start of the next object."""
 _SEARCHED: Final = 8
 
 _HEADERS: Final = (32, 40)

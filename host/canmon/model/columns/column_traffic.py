@@ -310,7 +310,7 @@ class _ColumnChanges:
 
 
 def _pieces(runs: Runs) -> tuple[Ints, Ints]:
-    """Split runs into pieces. Return the begin of each piece, and the first piece of each run."""
+    """Split runs into pieces. Return the start of each piece, and the first piece of each run."""
     counts = -(-runs.lengths // _ADDED)
     firsts = np.cumsum(counts) - counts
     nth = np.arange(int(counts.sum())) - np.repeat(firsts, counts)

@@ -99,7 +99,7 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Ba
 
     Args:
         series: samples of the signal.
-        from_us: begin of the first column.
+        from_us: start of the first column.
         to_us: end of the last column.
         columns: number of columns, at least 1.
     """

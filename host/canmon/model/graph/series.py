@@ -393,8 +393,8 @@ class View:
     """A span of time, and optionally the ranges of vertical axes.
 
     Attributes:
-        from_us: begin of the span.
-        to_us: end of the span, after its begin.
+        from_us: start of the span.
+        to_us: end of the span, after its start.
         ranges: least and greatest value of each axis by number. Other axes fit the visible values.
         cursor_us: moment that is marked, or None.
         origin_us: moment that is written as 0.

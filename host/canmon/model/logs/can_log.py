@@ -190,7 +190,7 @@ class BlfBlock(NamedTuple):
 _TakeApart = Callable[[bytes, float], BlfBlock | None]
 """Function that parses the content of a container.
 
-Its arguments are the content, and the begin of the log in s.
+Its arguments are the content, and the start of the log in s.
 """
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
@@ -478,7 +478,7 @@ _FIRST_BLF_S: Final = 631_152_000
 """Start of 1990. python-can takes a time before it for one that counts from zero."""
 
 _TRC_STEP_US: Final = 10_546_875
-"""Step of 2**-13 days. A multiple is exact as the fraction of a day at the begin of a TRC file."""
+"""Step of 2**-13 days. A multiple is exact as the fraction of a day at the start of a TRC file."""
 
 
 class _TrcWriter(can.TRCWriter):

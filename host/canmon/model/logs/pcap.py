@@ -234,7 +234,7 @@ class _PcapngReader:
             )
 
     def _take(self, data: bytes, records: list[Item]) -> int:
-        """Add the frames of the whole blocks. Return the begin of the next block."""
+        """Add the frames of the whole blocks. Return the start of the next block."""
         at, self._wanted = 0, _READ_BYTES
         while len(data) - (at := self._take_usual(data, at, records)) >= _BLOCK_BYTES:
             # A section may begin anywhere in a file, in the other byte order (files put one

@@ -273,7 +273,7 @@ class DictionaryPanel(Panel):
             self.query_one(PromptLine).prompt(question, "", lambda text: self._write(row, text))
 
     def action_filter(self) -> None:
-        """Ask for a part of a name, or the begin of an index."""
+        """Ask for a part of a name, or the start of an index."""
         self.query_one(PromptLine).prompt("name or index", self.filter_text, self._filter)
 
     def show_node(self, node: _Node) -> None:

@@ -360,7 +360,7 @@ class BusExchange:
     def send(self, frame: CanFrame) -> None:
         """Send a frame as soon as the load allows it.
 
-        Raises NotAllowed if the level does not allow the frame.
+        Raise NotAllowed if the level does not allow the frame.
         """
         self._permit(frame)
         link, is_request = self._link, frame.can_id == self._request

@@ -71,7 +71,7 @@ class SdoClient:
             return self.run(upload(index, sub, size))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write an object. Raises the same errors as `upload`."""
+        """Write an object. The errors are those of `upload`."""
         try:
             self.run(download(index, sub, data))
         except SdoTimeout:

@@ -144,11 +144,11 @@ class Client(Protocol):
     """A client that reads and writes objects of the node under test."""
 
     def upload(self, index: int, sub: int, /) -> bytes:
-        """Read an object. Raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        """Read an object. The errors are SdoAborted, SdoMisnamed and SdoTimeout."""
         ...
 
     def download(self, index: int, sub: int, data: bytes, /) -> None:
-        """Write an object. Raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        """Write an object. The errors are SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
 def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> None:
