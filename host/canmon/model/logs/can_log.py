@@ -91,7 +91,7 @@ _NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
 
 
 class CanLogReader:
-    """Reader of a log that python-can can read."""
+    """Reader of a log in a format that python-can supports."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()
