@@ -78,9 +78,9 @@ def run(**options: Any) -> None:
     SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT System Editor write it.
     Without SYSTEM, there is no component at first. Values that arrive at a ConsoleOut are printed.
 
-    Types are ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample, RefHardRh3, Odometry,
-    PositionInput, OmniTo2WD, Navigation, PathFollower and others. An unknown type is refused with a
-    list of all types.
+    Types: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample, RefHardRh3,
+    Odometry, PositionInput, OmniTo2WD, Navigation, PathFollower and others; an
+    unknown type is refused with a list of all.
 
     \b
     tickrig rtc run system.toml
