@@ -166,3 +166,34 @@ def test_no_docstring_or_message_has_a_retired_phrase(folder: str) -> None:
         for phrase in (*phrases(text), *ODD.findall(text.strip()))
     ]
     assert found == []
+
+
+FRAGMENT = re.compile(
+    r"^ +\*{0,2}(?P<name>[a-z_]\w*): (?P<entry>"
+    r"(?:of|by|as|in|for|to|from|with|on|if|at|per|above|its|after|before|under|such|so|what|how|why"
+    r"|when|where|which|until|without|through|only|same|[0-9][\w.]*)(?![-\w]).*)$",
+    re.MULTILINE,
+)
+"""An entry of Args or Attributes that cannot be read without its name: `index: of its object`."""
+
+
+def docstrings(module: Path) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            yield getattr(node, "lineno", 1), ast.get_docstring(node) or ""
+
+
+@pytest.mark.parametrize("folder", CLEAN)
+def test_each_entry_of_a_docstring_can_be_read_alone(folder: str) -> None:
+    found = [
+        f"{module.relative_to(ROOT)}:{line}: {entry['name']}: {entry['entry']}"
+        for module in modules_of([folder])
+        for line, text in docstrings(module)
+        for entry in FRAGMENT.finditer(text)
+    ]
+    assert found == []
+
+
+def test_fragments_are_found() -> None:
+    text = "Args:\n    index: of its object.\n    sub: sub-index.\n    low: 1 to 3.\n"
+    assert [entry["name"] for entry in FRAGMENT.finditer(text)] == ["index", "low"]

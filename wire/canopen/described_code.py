@@ -10,7 +10,7 @@ class DescribedCode(IntEnum):
     """A code that has a text; a member is written `NAME = code, text`.
 
     Attributes:
-        text: what the code means.
+        text: meaning of the code.
     """
 
     text: str
