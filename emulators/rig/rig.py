@@ -59,6 +59,7 @@ from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
+from tickrig.emulators.rig.sim_waits import HostLimit
 from tickrig.emulators.rig.station import Station, Timetable, is_wire_port, next_tick_us
 from tickrig.wire.instant import NEVER
 
@@ -249,6 +250,7 @@ class Rig(Copyable):
         now_us: time since the start of the rig.
         worst_late_us: largest delay of a step.
         late_ticks: number of steps that started more than `_LATE_US` late.
+        host_limit: limit on the waits of hosts. By default there is no limit.
         hosts: ends at which each arrival is a separate step. A watcher handles the arrival.
         watchers: functions that are called with the time after each step, in the order of
             registration.
@@ -267,6 +269,7 @@ class Rig(Copyable):
         self._late: deque[tuple[int, int]] = deque(maxlen=LATE_KEPT)
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
+        self.host_limit = HostLimit()
         self.hosts: Listeners[Host] = Listeners()
         self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.links.link import LinkClosed
+from tickrig.emulators.rig.sim_waits import Looks
+from tickrig.host.links.link import LinkClosed, LinkError
 from tickrig.wire.instant import NEVER
+
+_LOOKING: Final = "receive with a timeout"
 
 
 class SimLink:
@@ -18,7 +23,7 @@ class SimLink:
 
     def __init__(self, rig: Rig, end: ByteEnd) -> None:
         self._rig, self._end = rig, end
-        self._closed = False
+        self._closed, self._looks = False, Looks()
 
     @property
     def now_us(self) -> int:
@@ -40,6 +45,8 @@ class SimLink:
             self._end.send(self.now_us, traffic[:room])
             traffic = traffic[room:]
             if traffic:
+                if self.now_us >= self._rig.host_limit.due_us:
+                    self._rig.host_limit.count(self.now_us)
                 self._rig.run_for(1_000)
 
     def receive(self, timeout_us: int, /) -> bytes:
@@ -53,13 +60,19 @@ class SimLink:
 
         Raises:
             LinkClosed: the link was closed.
+            LinkError: too many polls at one instant, because the host would wait endlessly.
         """
         self._check_open()
-        deadline_us = self.now_us + timeout_us
-        while not (data := self._end.poll(self.now_us)) and self.now_us < deadline_us:
+        rig = self._rig
+        deadline_us = rig.now_us + timeout_us
+        if rig.now_us >= rig.host_limit.due_us and timeout_us > 0:
+            rig.host_limit.count(rig.now_us)
+        while not (data := self._end.poll(rig.now_us)) and rig.now_us < deadline_us:
             arrival_us = self._end.idle_us
-            until_us = arrival_us if arrival_us != NEVER else self._rig.next_us
-            self._rig.run_to(max(self.now_us, min(until_us, deadline_us)))
+            until_us = arrival_us if arrival_us != NEVER else rig.next_us
+            rig.run_to(max(rig.now_us, min(until_us, deadline_us)))
+        if not data and timeout_us <= 0 and (refusal := self._looks.refusal(rig.now_us, _LOOKING)):
+            raise LinkError(refusal)
         return data
 
     def close(self) -> None:

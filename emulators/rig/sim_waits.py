@@ -86,6 +86,35 @@ class Looks(Copyable):
         )
 
 
+class HostLimit(Copyable):
+    """The limit on the waits of hosts; this one is none, and a bench in virtual time has another.
+
+    Before a host advances the time, it calls `count` if `due_us` has passed.
+
+    Attributes:
+        due_us: when the next wait is counted.
+    """
+
+    due_us: int = NEVER
+
+    def restart(self, now_us: int) -> None:
+        """Begin again, because the test itself has advanced the time."""
+
+    def look(self, now_us: int) -> None:
+        """Count a read of the clock."""
+
+    def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
+        """Count a wait.
+
+        Args:
+            now_us: the present time.
+            where: returns the line that waits; by default that of the calling host.
+
+        Raises:
+            AssertionError: the limit is reached.
+        """
+
+
 class Passing(Protocol):
     """An object whose time can be advanced."""
 

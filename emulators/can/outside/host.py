@@ -117,8 +117,13 @@ class CanHost:
         self._inbox.clear()
         return self._rig.now_us, received
 
-    def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
+    def take(self, timeout_us: int | None, *, more: bool = False) -> tuple[int, CanFrame] | None:
         """Wait until a frame has arrived; return time and frame, or None after the timeout.
+
+        Args:
+            timeout_us: longest wait; None for no limit.
+            more: whether this continues a wait with a timeout, which is counted once
+                (`HostLimit`).
 
         Raises:
             LinkClosed: the link was closed.
@@ -136,6 +141,8 @@ class CanHost:
                     if timeout_us is not None and timeout_us <= 0:
                         self._look()
                     return None
+                if rig.now_us >= rig.host_limit.due_us and not more:
+                    rig.host_limit.count(rig.now_us)
                 rig.run_to(deadline_us if deadline_us < NEVER else self._chunk_us(), self._end)
         return inbox.popleft()
 

@@ -124,11 +124,12 @@ class TickrigBus(can.BusABC):
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Wait until a message has arrived; return None after `timeout` seconds."""
-        deadline_us = None if timeout is None else self.now_us + round(timeout * 1e6)
+        begun_us, more = self.now_us, False
+        deadline_us = None if timeout is None else begun_us + round(timeout * 1e6)
         while True:
             left_us = None if deadline_us is None else deadline_us - self.now_us
             try:
-                taken = self._host.take(left_us)
+                taken = self._host.take(left_us, more=more)
             except LinkError as error:
                 raise can.CanOperationError(str(error)) from error
             if taken is None:
@@ -137,6 +138,7 @@ class TickrigBus(can.BusABC):
             message.channel, message.is_rx = self.channel_info, not self._host.is_own(taken[0])
             if self._matches_filters(message):
                 return message
+            more = deadline_us is not None and self.now_us > begun_us
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Queue a message; no time passes."""

@@ -153,6 +153,7 @@ class SimNetwork(canopen.Network):
     def run_for(self, duration_us: int) -> None:
         """Advance the time, and deliver the frames that arrive."""
         self._wait_until(lambda: False, self.host.now_us + duration_us)
+        self._rig.host_limit.restart(self.host.now_us)
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
         """Advance the time until `done()`; return False after the timeout."""
@@ -161,13 +162,15 @@ class SimNetwork(canopen.Network):
 
     def _wait_until(self, done: Callable[[], bool], deadline_us: int | None) -> bool:
         self._waits += 1
+        begun_us, more = self.host.now_us, False
         try:
             while not done():
                 left_us = None if deadline_us is None else deadline_us - self.host.now_us
-                taken = self.host.take(left_us)
+                taken = self.host.take(left_us, more=more)
                 if taken is None:
                     return done()
                 self._deliver(*taken)
+                more = deadline_us is not None and self.host.now_us > begun_us
         finally:
             self._waits -= 1
         return True

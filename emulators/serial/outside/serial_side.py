@@ -491,6 +491,8 @@ class HostWaits(Copyable):
             done: function that returns whether to end the wait at once.
         """
         rig = self.rig
+        if rig.now_us >= rig.host_limit.due_us:
+            rig.host_limit.count(rig.now_us)
         at_us = due_us()
         if at_us > until_us:
             rig.run_until(lambda: due_us() <= until_us or done(), until_us - rig.now_us)

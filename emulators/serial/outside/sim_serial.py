@@ -482,7 +482,8 @@ class SimSerial(_SimPort):
         """
         side = self._side()
         self.break_condition = True
-        side.rig.run_for(round(duration * 1e6))
+        until_us = side.rig.now_us + round(duration * 1e6)
+        side.waits.wait(until_us, lambda: until_us)
         self.break_condition = False
 
     def _update_break_state(self) -> None:

@@ -56,6 +56,11 @@ class BenchTranscript(str):
 Duration = int | str
 """Microseconds, or a text such as `"100ms"`."""
 
+LIMIT: Final = "3600s"
+"""How long hosts may wait in virtual time until the test advances the time itself."""
+
+_NO_LIMIT: Final = "none"
+
 PRESS: Final = "100ms"
 SOON: Final = "100ms"
 
@@ -310,11 +315,14 @@ class Bench(BenchDevice, Closing):
         mode: `virtual` for virtual time, or `real` for real time with ptys and buses for the hosts.
         sdo_timeout: time after which CANopen nodes abort a transfer if the SDO client is silent.
             The default is 5 s, or the time-out of the given slave.
+        limit: longest time that hosts may wait in virtual time until the test calls `run_for` or
+            `wait_until`. A host that waits longer gets an error. One wait counts as one minute at
+            most. `"none"` means no limit.
         devices: several devices by name. CANopen slaves share a bus.
 
     Raises:
         ValueError: there is no device, or a name is unknown. The SDO time-out is 0, or there is an
-            SDO time-out but no node.
+            SDO time-out but no node. The limit is not a time.
 
     >>> from tickrig.device.rrc.machine import Rrc
     >>> with Bench(Rrc(), seed=1) as bench:
@@ -324,7 +332,7 @@ class Bench(BenchDevice, Closing):
     True
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - each by its name
         self,
         device: plan_parts.BenchedDevice | None = None,
         /,
@@ -333,6 +341,7 @@ class Bench(BenchDevice, Closing):
         line: LineSettings | None = None,
         mode: str = VIRTUAL,
         sdo_timeout: Duration | None = None,
+        limit: Duration = LIMIT,
         **devices: plan_parts.BenchedDevice,
     ) -> None:
         named = {**({} if device is None else {plan_parts.name_of(device): device}), **devices}
@@ -340,7 +349,7 @@ class Bench(BenchDevice, Closing):
             raise ValueError("a bench has at least one device")
         sdo_timeout_us = None if sdo_timeout is None else us_of(sdo_timeout)
         parts = Parts(mounts=plan_parts.mounts_of(named, seed, line, sdo_timeout_us), seed=seed)
-        self._start(_emulated(mode, parts, RigPlan()))
+        self._start(_emulated(mode, parts, RigPlan(), limit_us_of(limit)))
 
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
@@ -348,7 +357,13 @@ class Bench(BenchDevice, Closing):
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
 
     @classmethod
-    def of_plan(cls, plan: RigPlan, mode: str = VIRTUAL, terminal: Terminal | None = None) -> Self:
+    def of_plan(
+        cls,
+        plan: RigPlan,
+        mode: str = VIRTUAL,
+        terminal: Terminal | None = None,
+        limit: Duration = LIMIT,
+    ) -> Self:
         """Return the bench of a rig file.
 
         Args:
@@ -357,6 +372,7 @@ class Bench(BenchDevice, Closing):
                 ports of devices in the plan.
             terminal: terminal of the operator of real devices. The default is standard input and
                 output.
+            limit: how long hosts may wait, as in `Bench`.
 
         Raises:
             ValueError: a device cannot be made, or an option, an input, a fault or the mode is
@@ -366,7 +382,7 @@ class Bench(BenchDevice, Closing):
         """
         if mode == HARDWARE:
             return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
-        return cls.of_mode(_emulated(mode, plan_parts.parts_of(plan), plan))
+        return cls.of_mode(_emulated(mode, plan_parts.parts_of(plan), plan, limit_us_of(limit)))
 
     @classmethod
     def of_mode(cls, mode: BenchMode) -> Self:
@@ -500,6 +516,7 @@ class Bench(BenchDevice, Closing):
             TypeError: the body awaits something else, such as `asyncio.sleep`.
             RuntimeError: the condition of the body does not become true within a day of virtual
                 time, or can never become true.
+            AssertionError: the body waits longer than the limit of the bench, in many waits.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):
@@ -635,13 +652,20 @@ class Bench(BenchDevice, Closing):
         self._mode.close()
 
 
-def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None) -> Bench:
+def open_bench(
+    path: Path | str,
+    *,
+    mode: str = VIRTUAL,
+    seed: int | None = None,
+    limit: Duration = LIMIT,
+) -> Bench:
     """Open the bench described by a rig file.
 
     Args:
         path: path of the rig file.
         mode: `virtual`, `real` or `hardware`.
         seed: seed of all random numbers, which replaces the seed in the file.
+        limit: longest time that hosts may wait, as in `Bench`.
 
     Raises:
         OSError: the file cannot be read, or a port is not available.
@@ -650,17 +674,30 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
         PortGone: a bus cannot be opened.
     """
     plan = read_rig_file(Path(path))
-    return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
+    plan = plan if seed is None else replace(plan, seed=seed)
+    return Bench.of_plan(plan, mode, limit=limit)
+
+
+def limit_us_of(limit: Duration) -> int:
+    """Return a limit in microseconds, `NEVER` if there is none.
+
+    Raises:
+        ValueError: it is not a time.
+
+    >>> limit_us_of("2s"), limit_us_of("none") == limit_us_of(0) == NEVER
+    (2000000, True)
+    """
+    return NEVER if limit == _NO_LIMIT else us_of(limit) or NEVER
 
 
 def _never() -> bool:
     return False
 
 
-def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
+def _emulated(mode: str, parts: Parts, plan: RigPlan, limit_us: int) -> BenchMode:
     """Start emulated devices in virtual or in real time."""
     if mode == VIRTUAL:
-        return VirtualMode(plan_parts.rig_of(parts, plan))
+        return VirtualMode(plan_parts.rig_of(parts, plan), limit_us)
     if mode != _REAL:
         raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
     return real_mode.RealMode.open(

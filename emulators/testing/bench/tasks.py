@@ -9,11 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Coroutine, Generator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.host_clock.host_code import is_host, place_of
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
@@ -148,7 +150,9 @@ class _TaskWait(Protocol):
         """The time."""
         ...
 
-    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+    def await_until(
+        self, done: Callable[[], bool], within_us: int, where: Callable[[], str]
+    ) -> bool:
         """Advance the time until a condition is true; return False after the time-out."""
         ...
 
@@ -160,6 +164,7 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
         TypeError: the body awaits something else, such as `asyncio.sleep`.
         RuntimeError: the condition of the body does not become true within a day of virtual time,
             or can never become true.
+        HostHangsError: the limit for waits is reached.
         KeyboardInterrupt: the user has pressed Ctrl-C. The message has the condition and the
             waiting time.
     """
@@ -170,14 +175,25 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
         except StopIteration as end:
             result: _T = end.value
             return result
-        came = _wait(waiting, wait)
+        came = _wait(waiting, wait, partial(_place_of, body))
 
 
-def _wait(waiting: _TaskWait, wait: Wait) -> bool:
+def _place_of(body: object) -> str:
+    """Return file and line of the innermost host code in a body that waits."""
+    place = ""
+    while (frame := getattr(body, "cr_frame", None)) is not None:
+        file = frame.f_code.co_filename
+        if is_host(frame.f_globals.get("__name__") or "", file):
+            place = place_of(file, frame.f_lineno)
+        body = getattr(body, "cr_await", None)
+    return place
+
+
+def _wait(waiting: _TaskWait, wait: Wait, where: Callable[[], str]) -> bool:
     """Advance the time until a condition is true; return False after the time-out."""
     begun_us, for_ever = waiting.now_us, wait.until_us == NEVER
     try:
-        came = waiting.wait_until(wait.done, max(0, wait.until_us - begun_us))
+        came = waiting.await_until(wait.done, max(0, wait.until_us - begun_us), where)
     except KeyboardInterrupt:
         now = format_time(waiting.now_us)
         raise KeyboardInterrupt(f"{now} s old, waiting for {text_of(wait.done)}") from None

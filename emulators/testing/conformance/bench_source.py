@@ -12,6 +12,7 @@ from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.rig.sim_waits import HostLimit
 from tickrig.emulators.testing.bench.bench import Bench, BenchDevice
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
@@ -184,6 +185,7 @@ def bench_source(
     slaves = buses[bus]
     names = {slave.node_id: each for each, slave in slaves.items()}
     crashes = mode.act(lambda rig: _watch_nodes(_mount(rig, bus)))
+    limit = mode.act(lambda rig: _limit_hosts(rig, HostLimit()))  # each check ends by itself
     return ConformSource(
         mode.act(lambda rig: CanHost(rig.rig, _mount(rig, bus).open_end())),
         name or bus,
@@ -196,7 +198,7 @@ def bench_source(
         stimulus=lambda number: guarded(
             _BenchStimulus(BenchDevice(mode, names[number]), slaves[names[number]])
         ),
-        close=lambda: mode.act(lambda rig: _watch_no_more(_mount(rig, bus))),
+        close=lambda: mode.act(lambda rig: _end(rig, bus, limit)),
         watch=lambda number, run: _watch(crashes, names[number], run),
     )
 
@@ -238,9 +240,18 @@ def _watch_nodes(mount: BusMount) -> dict[str, Crashes]:
     return crashes
 
 
-def _watch_no_more(mount: BusMount) -> None:
-    for node in mount.nodes.values():
+def _limit_hosts(rig: BenchRig, limit: HostLimit) -> HostLimit:
+    """Start a limit on the waits of hosts; return the previous one."""
+    before, rig.rig.host_limit = rig.rig.host_limit, limit
+    limit.restart(rig.rig.now_us)
+    return before
+
+
+def _end(rig: BenchRig, bus: str, limit: HostLimit) -> None:
+    """Stop watching the nodes, and restore the limit on the waits of hosts."""
+    for node in _mount(rig, bus).nodes.values():
         node.on_crash = None
+    _limit_hosts(rig, limit)
 
 
 def _watch(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:

@@ -13,13 +13,14 @@ from itertools import chain
 from operator import is_
 from pathlib import Path
 from select import select
-from types import FunctionType, MethodType, ModuleType
+from types import FrameType, FunctionType, MethodType, ModuleType
 from typing import Any, Final, NamedTuple
 
 # Errors of hosts that use time in a way that virtual time does not support:
 #
 # - `HostTimeError`, a RuntimeError: the host waits, but nothing can advance the time.
 # - `UnpatchedTimeError`, a HostTimeError: the host waits for the clock of this machine.
+# - `HostHangsError`, an AssertionError: the host waits again and again, longer than it may.
 
 
 class HostTimeError(RuntimeError):
@@ -28,6 +29,10 @@ class HostTimeError(RuntimeError):
 
 class UnpatchedTimeError(HostTimeError):
     """A host waits by the clock of this machine, or reads it."""
+
+
+class HostHangsError(AssertionError):
+    """A host does not return: it waits longer than its bench or its machine allows."""
 
 
 _KEPT: Final = frozenset(
@@ -74,6 +79,16 @@ def place_of(file: str, line: int) -> str:
     """Return a file and line as text for messages."""
     path = Path(file)
     return f"{path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path}:{line}"
+
+
+def host_place(frame: FrameType | None) -> str:
+    """Return file and line of the innermost host code that has led to a frame; empty if none."""
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if is_host(frame.f_globals.get("__name__") or "", file):
+            return place_of(file, frame.f_lineno)
+        frame = frame.f_back
+    return ""
 
 
 # Functions of the clock that mean something else to hosts for a while, by whatever name.

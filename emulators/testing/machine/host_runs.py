@@ -17,6 +17,7 @@ from typing import Any, Final, Self
 from tickrig.emulators.testing.bench.bench import PRESS, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.host_clock.host_code import HostHangsError
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine, World
 from tickrig.host.text.names import near
 from tickrig.host.text.steps import content_lines
@@ -235,10 +236,6 @@ _LAST_LINES: Final = 12
 # invariant are failures, although they do not raise an Exception. Names are used, because this
 # module does not import pytest and Hypothesis (`assume`).
 _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssumption", "StopTest")
-
-
-class HostHangsError(AssertionError):
-    """A host does not return: a call or a whole run takes longer than the machine allows."""
 
 
 @dataclass(frozen=True, slots=True)

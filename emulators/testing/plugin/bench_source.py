@@ -23,11 +23,11 @@ from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.faults import near_fault
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.emulators.testing.bench.bench import HARDWARE, VIRTUAL, Bench
+from tickrig.emulators.testing.bench.bench import HARDWARE, LIMIT, VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.plan_parts import BenchedDevice, name_of, named_device
-from tickrig.emulators.testing.plugin.health import CLOCK, ERRORS, LOST, THREADS
+from tickrig.emulators.testing.plugin.health import CLOCK, ERRORS, LONG_WAITS, LOST, THREADS
 from tickrig.emulators.testing.plugin.settings import MODES
 from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES, kind_of
 from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan
@@ -41,7 +41,7 @@ BenchSource = _Source | Callable[[], _Source] | None
 """A device or a factory of a device, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
 A device may also be a text, as the `type` in a rig file."""
 
-_NO_DEVICES: Final = ("seed", "line", "mode")
+_NO_DEVICES: Final = ("seed", "line", "mode", "sdo_timeout", "limit")
 """Arguments of `Bench` that are not devices."""
 
 _NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
@@ -78,12 +78,14 @@ class WantedBench(NamedTuple):
         mode: `virtual`, `real` or `hardware`.
         seed: seed of all random numbers, or None to use the seed of the source.
         folder: folder that relative paths start from.
+        limit: longest time that hosts may wait, or None to use the limit of the source.
     """
 
     source: BenchSource
     mode: str
     seed: int | None
     folder: Path
+    limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
         """Return the request with the devices of this test, made and with complete paths.
@@ -111,10 +113,13 @@ class WantedBench(NamedTuple):
         """
         if isinstance(self.source, Path):
             plan = plan_of(self.source)
-            return Bench.of_plan(replace(plan, seed=self.seed_used), self.mode)
+            plan = replace(plan, seed=self.seed_used)
+            return Bench.of_plan(plan, self.mode, limit=self.limit or LIMIT)
         if self.mode == HARDWARE:
             raise NotOnThisBench("where the hardware is stands in a rig file: --bench RIG.TOML")
         options = {"mode": self.mode, **self._options, "seed": self.seed_used}
+        if self.limit is not None:
+            options["limit"] = self.limit
         return Bench(options.pop("", None), **options)
 
     @property
@@ -192,7 +197,7 @@ def _plan_of(path: Path, changed_ns: int) -> RigPlan:
 
 # What a test needs of its bench, and what of it is not there.
 
-ALLOWED: Final = (ERRORS, LOST, CLOCK, THREADS)
+ALLOWED: Final = (ERRORS, LOST, CLOCK, THREADS, LONG_WAITS)
 HAND: Final = "hand"
 _OR: Final = " or "
 _MEANT: Final = "did you mean"

@@ -21,6 +21,7 @@ from tickrig.emulators.testing.plugin.bench_source import WarmUp, warmed
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
 from tickrig.emulators.testing.plugin.health import (
+    LONG_WAITS,
     THREADS,
     Health,
     SafeState,
@@ -31,7 +32,7 @@ from tickrig.emulators.testing.plugin.health import (
     unsafe,
     with_plan,
 )
-from tickrig.emulators.testing.plugin.settings import SETTINGS
+from tickrig.emulators.testing.plugin.settings import NO_LIMIT, SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
 
@@ -110,6 +111,8 @@ class _BenchedTest(TestWithBench):
         """
         needs, self._allowed = bench_source.needs_of(self.item), bench_source.allowed_of(self.item)
         bench_source.check_mode(needs, self.wanted.mode)
+        if LONG_WAITS in self._allowed:
+            self.wanted = self.wanted._replace(limit=NO_LIMIT)
         self._listen()
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = warmed(self.item, self.wanted.open(), self._warm_up)
@@ -185,6 +188,8 @@ class _BenchedTest(TestWithBench):
     def _check(self, bench: Bench) -> None:
         """Check the bench of a test that has passed; fail the test if there is a problem."""
         bench.check_tasks()
+        if hung := bench._mode.hung():  # and the host has caught the error
+            pytest.fail(hung, pytrace=False)
         if unheard := self.take_unheard():
             fail = MisusedError if self._is_misused else pytest.fail.Exception
             raise fail("\n".join(unheard), pytrace=False)
@@ -239,7 +244,8 @@ def benched(
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
-    wanted = bench_source.WantedBench(source, mode, settings.seed, request.path.parent)
+    folder = request.path.parent
+    wanted = bench_source.WantedBench(source, mode, settings.seed, folder, settings.limit)
     test = request.node.stash[BENCHED] = _BenchedTest(request.node, wanted, safe, warm_up)
     try:
         yield _opened(test)

@@ -295,6 +295,7 @@ def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
 
 
 CLOCK: Final = "clock"
+LONG_WAITS: Final = "long waits"
 
 
 def guard(

@@ -35,8 +35,8 @@ MARKERS: Final = (
     "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
     "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
     "allows(*what): what may happen though no fault ordered it: 'lost' for what found a buffer "
-    "full, 'error frames', 'threads' that die, and 'clock' for looks at the machine's in virtual "
-    "time (tickrig)",
+    "full, 'error frames', 'threads' that die, 'clock' for looks at the machine's in virtual "
+    "time, and 'long waits' of hosts (tickrig)",
 )
 
 _PLUGINS: Final = {

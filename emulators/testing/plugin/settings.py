@@ -12,11 +12,12 @@ from tickrig._lazy import LazyModule
 
 if TYPE_CHECKING:
     from tickrig.host.text import values
-else:  # --bench-param alone needs them
+else:  # only some options need them
     values = LazyModule("tickrig.host.text.values")
 
 MODES: Final = ("virtual", "real", "hardware")
 RANDOM: Final = "random"
+NO_LIMIT: Final = "none"
 _FAILED: Final = "failed"
 _EVERY: Final = "every"
 
@@ -47,6 +48,7 @@ OPTIONS: Final = (
     _Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
     _Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
     _Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
+    _Option("bench_limit", "TIME", "end a host that waits for so long in virtual time, or `none`"),
     _Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
     _Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
     _Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
@@ -76,6 +78,7 @@ class PluginSettings(NamedTuple):
         ordered: whether the command line names the rig file.
         modes: modes in which each test runs.
         seed: seed of all random numbers, or None to use the seed of the rig file or test.
+        limit: longest time that hosts may wait, or None to use the limit of the test.
         artifacts: folder for kept files, or None to keep no files.
         every: whether to keep files of passed tests too.
         compare: whether each test runs twice.
@@ -88,6 +91,7 @@ class PluginSettings(NamedTuple):
     ordered: bool = False
     modes: tuple[str, ...] = MODES[:1]
     seed: int | None = None
+    limit: str | None = None
     artifacts: Path | None = None
     every: bool = False
     compare: bool = False
@@ -104,6 +108,7 @@ class PluginSettings(NamedTuple):
             config.getoption("bench") is not None,
             _modes(wanted["bench_mode"] or MODES[0]),
             _seed(wanted["bench_seed"]),
+            _limit(wanted["bench_limit"]),
             _path(config, "bench_artifacts", wanted["bench_artifacts"]),
             _every(wanted["bench_artifacts_of"] or _FAILED),
             wanted["bench_compare"].lower() in {"true", "1", "yes", "on"},
@@ -169,6 +174,15 @@ def _seed(text: str) -> int | None:
     if not text.isdecimal():
         raise pytest.UsageError(f"--bench-seed {text}: it is a number from 0 on, or {RANDOM}")
     return int(text)
+
+
+def _limit(text: str) -> str | None:
+    if text and text != NO_LIMIT:
+        try:
+            values.us_of(text)
+        except ValueError as error:
+            raise pytest.UsageError(f"--bench-limit {text}: {error}, or {NO_LIMIT}") from None
+    return text or None
 
 
 def _parameters(text: str) -> tuple[_BenchParameter, ...]:

@@ -13,6 +13,7 @@ import pytest
 import tickrig
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError
+from tickrig.emulators.testing.host_clock.host_code import HostHangsError
 
 _PACKAGE: Final = Path(tickrig.__file__).parent
 
@@ -92,6 +93,8 @@ def _raiser(error: BaseException) -> str:
 def end_at_caller(error: BaseException) -> None:
     """Remove tickrig's frames from the end of a traceback, if a call of tickrig was refused.
 
+    They are also removed if a host waits endlessly, so that the line that waits is the last one.
+
     Args:
         error: the exception of the test.
     """
@@ -102,7 +105,7 @@ def end_at_caller(error: BaseException) -> None:
         if _package_of(entry) not in ("tickrig", "contextlib"):
             last = entry
         entry = entry.tb_next
-    refused = isinstance(error, (TypeError, *_REFUSALS))
+    refused = isinstance(error, (TypeError, HostHangsError, *_REFUSALS))
     if refused and last and _package_of(last) not in ("_pytest", "pluggy"):
         last.tb_next = None
 

@@ -72,6 +72,8 @@ class BenchTestCase(unittest.TestCase):
                 try:
                     returned = test()
                     self.bench.check_tasks()
+                    if hung := self.bench._mode.hung():
+                        self.fail(hung)
                 except (NotOnThisBench, unittest.SkipTest):
                     raise
                 except Exception as error:

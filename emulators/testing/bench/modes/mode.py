@@ -165,6 +165,18 @@ class BenchMode(ABC):
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Advance the time until a condition is true; return False after the time-out."""
 
+    def await_until(
+        self, done: Callable[[], bool], within_us: int, where: Callable[[], str]
+    ) -> bool:
+        """Advance the time as `wait_until` does, for an async body.
+
+        Args:
+            done: the condition.
+            within_us: longest wait.
+            where: returns the line of the body that waits.
+        """
+        return self.wait_until(done, within_us)
+
     @abstractmethod
     def save_trace(self, path: Path) -> None:
         """Write a trace of the run; raise OSError if that fails."""
@@ -184,6 +196,10 @@ class BenchMode(ABC):
     @abstractmethod
     def too_slow(self) -> str:
         """Return why failures are not valid, or "" if real time was kept."""
+
+    def hung(self) -> str:
+        """Return the error of a host that has waited endlessly; empty if there was none."""
+        return ""
 
     @abstractmethod
     def fork(self) -> BenchMode:

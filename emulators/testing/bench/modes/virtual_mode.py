@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from tickrig._lazy import LazyModule
 from tickrig.device.twin import twin
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US
+from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US, HostLimit
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
@@ -21,9 +22,10 @@ from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.mode import Address, EmulatedMode
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.bench.tasks import DAY_US
-from tickrig.emulators.testing.host_clock.host_code import HostTimeError
+from tickrig.emulators.testing.host_clock.host_code import HostHangsError, HostTimeError, host_place
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.rig_file.plan import Tolerances
+from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -42,6 +44,91 @@ else:  # python-can and canopen are slow
 
 _LONGEST_US: Final = 3_600_000_000
 """Longest wait without a timeout: an hour."""
+
+
+_PART_US: Final = 60_000_000
+"""A wait counts as one minute at most, so a few long time-outs are no polling."""
+
+_MOST_LOOKS: Final = 2_000_000
+"""Largest number of reads of the clock between two calls of the test, and of waits that take no
+time; they take some seconds."""
+
+_MOST_CAUGHT: Final = 100
+"""How often a host may catch the error; then it gets one that `except Exception` does not catch."""
+
+
+_ENDLESS: Final = (
+    "and the test has called neither run_for nor wait_until since. Give the host a time-out, or"
+    ' raise the limit: Bench(..., limit="7200s"), --bench-limit 7200s, or bench_limit in the'
+    ' configuration file; "none" switches it off'
+)
+
+
+class _CaughtError(BaseException):
+    """A host waits endlessly, and catches each `HostHangsError`."""
+
+
+class _WaitLimit(HostLimit):
+    """The time for which hosts may wait until the test advances the time itself.
+
+    Only virtual time counts, so a repeated run ends at the same wait.
+
+    Args:
+        limit_us: the limit; `NEVER` for none.
+        now_us: the present time.
+
+    Attributes:
+        limit_us: the limit.
+        refused: text of the first error; empty if there was none.
+    """
+
+    def __init__(self, limit_us: int, now_us: int) -> None:
+        self.limit_us, self.refused = limit_us, ""
+        self._most_parts = -(-limit_us // _PART_US)
+        self._first_us = limit_us - (self._most_parts - 1) * _PART_US  # the shortest
+        self.restart(now_us)
+
+    def restart(self, now_us: int) -> None:
+        """Begin again, because the test itself has advanced the time."""
+        self._looks = self._caught = 0
+        self._parts = self._most_parts
+        self.due_us = now_us + self._first_us if self.limit_us < NEVER else NEVER
+
+    def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
+        """Count a part.
+
+        Args:
+            now_us: the present time.
+            where: returns the line that waits; by default that of the calling host.
+
+        Raises:
+            HostHangsError: the limit is reached.
+        """
+        if self._parts <= 1:
+            waited = f"has waited for {format_time(self.limit_us)} s of virtual time"
+            self._refuse(now_us, waited, where)
+        self._parts -= 1
+        due_us = self.due_us + _PART_US
+        self.due_us = due_us if due_us > now_us else now_us + _PART_US
+
+    def look(
+        self, now_us: int, what: str = "read the clock", where: Callable[[], str] | None = None
+    ) -> None:
+        """Count a read of the clock, or a wait that has taken no time.
+
+        Raises:
+            HostHangsError: there were too many.
+        """
+        self._looks += 1
+        if self._looks > _MOST_LOOKS and self.limit_us < NEVER:
+            self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
+
+    def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None) -> NoReturn:
+        place = (where() if where else host_place(sys._getframe(1))) or "a host"
+        text = f"{place}: the host {what}, up to {format_time(now_us)} s, {_ENDLESS}"
+        self.refused = self.refused or text
+        self._caught += 1
+        raise (HostHangsError if self._caught <= _MOST_CAUGHT else _CaughtError)(text)
 
 
 class RigPassing:
@@ -68,10 +155,16 @@ class RigPassing:
 
         Raises:
             HostTimeError: the rig has called the method in the middle of a step.
+            HostHangsError: the limit for waits is reached.
         """
         timeout_us = _LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
-        if not self._rig.in_step:
-            return self._rig.run_until(done, timeout_us)
+        if not (rig := self._rig).in_step:
+            limit = rig.host_limit
+            if timeout_us <= LOOK_US:
+                limit.look(rig.now_us)
+            if rig.now_us >= limit.due_us:
+                limit.count(rig.now_us)
+            return rig.run_until(done, timeout_us)
         if timeout_us > LOOK_US:
             raise HostTimeError("what is called back while time passes cannot wait itself")
         return done()
@@ -199,13 +292,16 @@ class VirtualMode(EmulatedMode):
 
     Args:
         rig: rig with the devices.
+        limit_us: longest time that hosts may wait until the test advances the time itself; `NEVER`
+            for no limit.
     """
 
     name = "virtual"
 
-    def __init__(self, rig: BenchRig) -> None:
+    def __init__(self, rig: BenchRig, limit_us: int = NEVER) -> None:
         super().__init__(rig, _EXACT)
         self.doors, self._closed = _VirtualDoors(rig), False
+        rig.rig.host_limit = self._limit = _WaitLimit(limit_us, rig.rig.now_us)
 
     @property
     def now_us(self) -> int:
@@ -221,6 +317,7 @@ class VirtualMode(EmulatedMode):
         """Advance the time."""
         self._check_open()
         self._rig.rig.run_for(duration_us)
+        self._limit.restart(self._rig.rig.now_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Advance the time until a condition is true; return False after the time-out.
@@ -229,6 +326,24 @@ class VirtualMode(EmulatedMode):
         is checked after each step. In long steps it is also checked periodically, because it may
         poll a host that has work to do.
         """
+        found = self._wait_until(done, within_us)
+        self._limit.restart(self._rig.rig.now_us)
+        return found
+
+    def await_until(
+        self, done: Callable[[], bool], within_us: int, where: Callable[[], str]
+    ) -> bool:
+        """Advance the time as `wait_until` does; it counts as a wait of a host."""
+        rig = self._rig.rig
+        before_us = rig.now_us
+        if before_us >= self._limit.due_us:
+            self._limit.count(before_us, where)
+        found = self._wait_until(done, within_us)
+        if rig.now_us == before_us:
+            self._limit.look(before_us, "awaited 0 s", where)
+        return found
+
+    def _wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         self._check_open()
         rig = self._rig.rig
         for_ever = rig.now_us + within_us >= NEVER
@@ -253,9 +368,14 @@ class VirtualMode(EmulatedMode):
         """Return an empty text: virtual time is always kept."""
         return ""
 
+    def hung(self) -> str:
+        """Return the error of a host that has waited endlessly; empty if there was none."""
+        return self._limit.refused
+
     def fork(self) -> VirtualMode:
         """Return a twin that continues independently, without hosts and triggers."""
-        return VirtualMode(BenchRig(self._rig.name, twin(self._rig.state)))
+        state = twin(self._rig.state)
+        return VirtualMode(BenchRig(self._rig.name, state), self._limit.limit_us)
 
     def close(self) -> None:
         """Release all resources; time stops."""

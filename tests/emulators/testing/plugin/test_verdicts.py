@@ -278,7 +278,8 @@ def test_what_found_a_buffer_full_fails_the_test_unless_a_fault_is_to_blame(
     result.assert_outcomes(passed=2, failed=2, errors=1)
     result.stdout.fnmatch_lines(
         [
-            "no bench: allows('loss'): it can allow 'error frames', 'lost', 'clock', 'threads'",
+            "no bench: allows('loss'): it can allow 'error frames', 'lost', 'clock', 'threads', "
+            "'long waits'",
             "urg: * bytes found a buffer full",
         ]
     )
