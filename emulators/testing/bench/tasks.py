@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.sim_waits import Looks
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.host_clock.host_code import is_host, place_of
+from tickrig.emulators.testing.host_clock.host_code import HostHangsError, place_of_body
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
@@ -175,18 +176,7 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
         except StopIteration as end:
             result: _T = end.value
             return result
-        came = _wait(waiting, wait, partial(_place_of, body))
-
-
-def _place_of(body: object) -> str:
-    """Return file and line of the innermost host code in a body that waits."""
-    place = ""
-    while (frame := getattr(body, "cr_frame", None)) is not None:
-        file = frame.f_code.co_filename
-        if is_host(frame.f_globals.get("__name__") or "", file):
-            place = place_of(file, frame.f_lineno)
-        body = getattr(body, "cr_await", None)
-    return place
+        came = _wait(waiting, wait, partial(place_of_body, body))
 
 
 def _wait(waiting: _TaskWait, wait: Wait, where: Callable[[], str]) -> bool:
@@ -205,6 +195,9 @@ def _wait(waiting: _TaskWait, wait: Wait, where: Callable[[], str]) -> bool:
     return came
 
 
+_NO_TIME: Final = "await bench.sleep of some time"
+
+
 class Task(Generic[_T]):
     """A body that runs beside the test, between two ticks.
 
@@ -216,6 +209,7 @@ class Task(Generic[_T]):
     def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, _T]) -> None:
         self._rig, self._body = rig, body
         self._wait: Wait | None = None
+        self._looks = Looks()
         self._result: list[_T] = []
         self._error: BaseException | None = None
         self._raised = False
@@ -259,7 +253,11 @@ class Task(Generic[_T]):
     def _look(self, now_us: int) -> None:
         wait = self._wait
         if wait is not None and ((came := wait.done()) or now_us >= wait.until_us):
-            self._go_on(came)
+            if refusal := self._looks.refusal(now_us, _NO_TIME):
+                self._error = HostHangsError(f"{place_of_body(self._body)}: {refusal}")
+                self.cancel()
+            else:
+                self._go_on(came)
 
     def _go_on(self, came: bool | None) -> None:
         try:

@@ -12,14 +12,21 @@ from selectors import SelectorKey
 from threading import get_ident
 from typing import Any, Final, TypeVar, TypeVarTuple
 
-from tickrig.emulators.rig.sim_waits import Passing
-from tickrig.emulators.testing.host_clock.host_code import HostTimeError
+from tickrig.emulators.rig.sim_waits import EPOCH_S, Passing
+from tickrig.emulators.testing.host_clock.host_code import (
+    HostHangsError,
+    HostTimeError,
+    place_of_body,
+)
 
 _T = TypeVar("_T")
 _Ts = TypeVarTuple("_Ts")
 
 _EXECUTOR_S: Final = 5.0
 """Longest real time for which a loop waits for a function in a thread."""
+
+_MOST_SPINS: Final = 1 << 20
+"""How often a loop may run at one instant; it takes some seconds."""
 
 _Events = list[tuple[SelectorKey, int]]
 
@@ -37,7 +44,7 @@ class _BenchLoop(asyncio.SelectorEventLoop):
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
         self._threads: ThreadPoolExecutor | None = None
-        super().__init__(_PassingSelector(passing, self._called))
+        super().__init__(_PassingSelector(passing, self._called, self._places))
         self._clock_resolution = 1e-6  # of the rig, not of this machine
 
     def time(self) -> float:
@@ -68,6 +75,11 @@ class _BenchLoop(asyncio.SelectorEventLoop):
             self._threads.shutdown(wait=False)
         super().close()
 
+    def _places(self) -> str:
+        """Return the lines at which its tasks wait."""
+        places = {place_of_body(task.get_coro()) for task in asyncio.all_tasks(self)}
+        return ", ".join(sorted(places - {""}))
+
     def _called(self) -> bool:
         """Return whether a callback is due at once."""
         ready: object = vars(self).get("_ready")
@@ -96,8 +108,11 @@ def bench_loops(passing: Passing) -> Iterator[None]:
 class _PassingSelector(selectors.BaseSelector):
     """A selector that advances the time of a rig instead of waiting."""
 
-    def __init__(self, passing: Passing, called: Callable[[], bool]) -> None:
-        self._passing, self._called = passing, called
+    def __init__(
+        self, passing: Passing, called: Callable[[], bool], places: Callable[[], str]
+    ) -> None:
+        self._passing, self._called, self._places = passing, called, places
+        self._spins, self._time_s = 0, passing.time_s
         self._inner = selectors.DefaultSelector()
 
     def register(self, fileobj: Any, events: int, data: Any = None) -> SelectorKey:
@@ -124,6 +139,9 @@ class _PassingSelector(selectors.BaseSelector):
             return bool(found) or self._called()
 
         if found or (timeout is not None and timeout <= 0):
+            self._spins += 1
+            if self._spins >= _MOST_SPINS:
+                self._check_time()
             return found
         timeout_s = None if timeout is None else ceil(timeout * 1e6) / 1e6
         if not self._passing.wait(come, timeout_s) and timeout is None:
@@ -132,3 +150,14 @@ class _PassingSelector(selectors.BaseSelector):
                 " neither threads nor sockets are waited for in virtual time"
             )
         return found
+
+    def _check_time(self) -> None:
+        """Raise HostHangsError if no time has passed since the last call."""
+        before_s, self._time_s = self._time_s, self._passing.time_s
+        spins, self._spins = self._spins, 0
+        if self._time_s == before_s:
+            raise HostHangsError(
+                f"{self._places() or 'an event loop'}: the event loop has run {spins} times at"
+                f" {self._time_s - EPOCH_S:.6f} s: asyncio.sleep(0) makes no time pass; sleep for"
+                " some time"
+            )

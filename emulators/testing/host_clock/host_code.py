@@ -91,6 +91,17 @@ def host_place(frame: FrameType | None) -> str:
     return ""
 
 
+def place_of_body(body: object) -> str:
+    """Return file and line of the innermost host code in a coroutine that waits; empty if none."""
+    place = ""
+    while (frame := getattr(body, "cr_frame", None)) is not None:
+        file = frame.f_code.co_filename
+        if is_host(frame.f_globals.get("__name__") or "", file):
+            place = place_of(file, frame.f_lineno)
+        body = getattr(body, "cr_await", None)
+    return place
+
+
 # Functions of the clock that mean something else to hosts for a while, by whatever name.
 
 # A function that means something else to hosts, for a while.

@@ -25,6 +25,7 @@ from tickrig.emulators.testing.bench.tasks import DAY_US
 from tickrig.emulators.testing.host_clock.host_code import HostHangsError, HostTimeError, host_place
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.rig_file.plan import Tolerances
+from tickrig.host.control.requests import Object
 from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
 
@@ -52,6 +53,9 @@ _PART_US: Final = 60_000_000
 _MOST_LOOKS: Final = 2_000_000
 """Largest number of reads of the clock between two calls of the test, and of waits that take no
 time; they take some seconds."""
+
+_MOST_GETS: Final = 1_000_000
+"""Largest number of requests, such as `get`, at one instant; they take some seconds."""
 
 _MOST_CAUGHT: Final = 100
 """How often a host may catch the error; then it gets one that `except Exception` does not catch."""
@@ -85,6 +89,7 @@ class _WaitLimit(HostLimit):
     def __init__(self, limit_us: int, now_us: int) -> None:
         self.limit_us, self.refused = limit_us, ""
         self._most_parts = -(-limit_us // _PART_US)
+        self._asked, self._asked_us = 0, now_us
         self._first_us = limit_us - (self._most_parts - 1) * _PART_US  # the shortest
         self.restart(now_us)
 
@@ -123,7 +128,19 @@ class _WaitLimit(HostLimit):
         if self._looks > _MOST_LOOKS and self.limit_us < NEVER:
             self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
 
-    def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None) -> NoReturn:
+    def ask(self, now_us: int) -> None:
+        """Count a request of the test.
+
+        Raises:
+            HostHangsError: there were too many at one instant.
+        """
+        if now_us != self._asked_us:
+            self._asked, self._asked_us = 0, now_us
+        self._asked += 1
+        if self._asked > _MOST_GETS and self.limit_us < NEVER:
+            self._refuse(now_us, f"has asked the bench {_MOST_GETS} times at one instant")
+
+    def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None = None) -> NoReturn:
         place = (where() if where else host_place(sys._getframe(1))) or "a host"
         text = f"{place}: the host {what}, up to {format_time(now_us)} s, {_ENDLESS}"
         self.refused = self.refused or text
@@ -312,6 +329,11 @@ class VirtualMode(EmulatedMode):
     def act(self, action: Callable[[BenchRig], _T]) -> _T:
         """Run a function on the rig between two ticks."""
         return action(self._rig)
+
+    def request(self, do: str, **fields: object) -> Object:
+        """Execute a request of the control socket; ValueError if it is refused."""
+        self._limit.ask(self._rig.rig.now_us)
+        return super().request(do, **fields)
 
     def run_for(self, duration_us: int) -> None:
         """Advance the time."""

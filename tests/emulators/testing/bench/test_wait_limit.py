@@ -20,6 +20,7 @@ from tickrig import Bench, open_bench
 from tickrig.device import Rrc, make_f_palette
 from tickrig.emulators.rig.sim_waits import MOST_LOOKS
 from tickrig.emulators.testing.bench.modes import virtual_mode
+from tickrig.emulators.testing.host_clock import bench_loop
 from tickrig.emulators.testing.host_clock.host_code import HostHangsError
 from tickrig.host.links.link import LinkError
 from tickrig.testing import conformance
@@ -302,3 +303,54 @@ def test_the_limit_is_not_that_of_the_conformance_tester() -> None:
         assert bench.now_us > 3_000_000
         with bench.can_bus() as bus, pytest.raises(HostHangsError):
             poll(bus, never)
+
+
+def test_a_test_that_only_asks_the_bench_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wait_for(bench: Bench, state: str) -> None:
+        while bench.get("state") != state:
+            pass
+
+    monkeypatch.setattr(virtual_mode, "_MOST_GETS", 2_000)
+    with Bench(Rrc()) as bench:
+        for _ in range(3):
+            for _ in range(1_500):
+                bench.get("state")
+            bench.run_for("1ms")
+        with pytest.raises(HostHangsError, match=r"limit\.py:\d+: .* the bench 2000 times at one "):
+            wait_for(bench, "Ready")
+
+
+def test_a_task_that_awaits_no_time_is_ended() -> None:
+    async def spin(bench: Bench) -> None:
+        while True:
+            await bench.sleep(0)
+
+    with Bench(Rrc()) as bench:
+        bench.run_for("1s")
+        task = bench.start(spin(bench))
+        bench.run_for("1s")
+        assert task.done
+        with pytest.raises(HostHangsError, match=r"limit\.py:\d+: looked 10000 times at 1\.00"):
+            bench.check_tasks()
+
+
+def test_an_event_loop_that_sleeps_for_no_time_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def spin() -> None:
+        while True:
+            await asyncio.sleep(0)
+
+    async def sleep_and_spin() -> None:
+        for _ in range(5):
+            for _ in range(900):
+                await asyncio.sleep(0)
+            await asyncio.sleep(1)
+        await asyncio.gather(asyncio.sleep(5), spin())
+
+    monkeypatch.setattr(bench_loop, "_MOST_SPINS", 1_000)
+    refused = r"limit\.py:\d+, .*limit\.py:\d+: the event loop has run 1000 times at 5\.0"
+    with (
+        Bench(Rrc()) as bench,
+        bench.patched_time(),
+        pytest.raises(HostHangsError, match=refused),
+    ):
+        asyncio.run(sleep_and_spin())
