@@ -117,6 +117,7 @@ class ScenarioParser:
         senders: Mapping[str, Sender] | None = None,
     ) -> None:
         self._device, self._operator = device, operator
+        self._at_us = 0  # of the line that is read
         self._verbs: dict[str, Callable[[str], _Action | _Wanted]] = {
             **(senders or _line_senders(encoders or {})),
             "set": self._parse_set,
@@ -157,6 +158,7 @@ class ScenarioParser:
             raise ValueError(f"{verb} comes after end")
         if verb not in self._verbs:
             raise ValueError(f"no action {verb!r}; {near(verb, self._verbs)}")
+        self._at_us = at_us
         action = self._verbs[verb](rest or "")
         if isinstance(action, _Wanted):
             line, within_us = action
@@ -185,7 +187,7 @@ class ScenarioParser:
         return _Release(rest)
 
     def _parse_fault(self, rest: str) -> FaultSpec:
-        spec = parse_fault_spec(rest, self._operator.check_clear)
+        spec = parse_fault_spec(rest, self._operator.check_clear, self._at_us)
         self._operator.check_fault(spec)
         return spec
 

@@ -144,8 +144,8 @@ class EmulatorControl(RequestDispatcher):
 
     def _fault(self, request: Object) -> Object:
         emulator = self._emulator
-        spec = parse_fault_spec(text_of(request, "spec"), emulator.operator.check_clear)
-        emulator.operator.fault(emulator.effective_us, spec)
+        check, now_us = emulator.operator.check_clear, emulator.effective_us
+        emulator.operator.fault(now_us, parse_fault_spec(text_of(request, "spec"), check, now_us))
         return {}
 
     def _clear(self, request: Object) -> Object:

@@ -58,19 +58,25 @@ def _any_name(name: str) -> None:
     """Accept any name."""
 
 
-def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name) -> FaultSpec:
+def parse_fault_spec(
+    text: str, check_name: Callable[[str], object] = _any_name, now_us: int = 0
+) -> FaultSpec:
     """Read a fault.
 
     Args:
-        text: text of a fault, such as `flip=0.001@5s-7s`.
+        text: text of a fault, such as `flip=0.001@5s-7s`, or `cut@+100ms-+2s` with times that count
+            from `now_us`.
         check_name: function that is called with the name before the times are read. It raises
             ValueError for an unknown fault.
+        now_us: present time.
 
     Raises:
         ValueError: the text has a wrong form, or the name is unknown.
 
     >>> parse_fault_spec("flip=0.001@5s-7s")
     FaultSpec(name='flip', arguments=('0.001',), from_us=5000000, to_us=7000000)
+    >>> parse_fault_spec("cut@+100ms", now_us=5_000_000).from_us
+    5100000
     """
     match = _SPEC.fullmatch(text)
     if match is None:
@@ -88,9 +94,14 @@ def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name)
     return FaultSpec(
         name,
         () if argument is None else tuple(argument.split(",")),
-        parse_time_us(start) if start is not None else 0,
-        parse_time_us(stop) if stop is not None else NEVER,
+        _time_us(start, now_us) if start is not None else 0,
+        _time_us(stop, now_us) if stop is not None else NEVER,
     )
+
+
+def _time_us(text: str, now_us: int) -> int:
+    """Read a time since the start, or from now on: `+100ms`."""
+    return now_us + parse_time_us(text[1:]) if text[:1] == "+" else parse_time_us(text)
 
 
 def _is_named(name: str, check_name: Callable[[str], object]) -> bool:

@@ -222,6 +222,8 @@ def press(name: str, duration: str) -> Object:
 def fault(spec: str) -> Object:
     """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]. Times count from the start.
 
+    Times with +, as in cut@+1s-+2s, count from now.
+
     \b
     tickrig ctl /tmp/rrc.ctl fault flip=0.001
     """  # noqa: D301 - click wants the backspace

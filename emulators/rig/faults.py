@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Final, Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
@@ -55,6 +55,7 @@ class FaultArgument(Immutable):
         choices: allowed words instead of a number, if any.
         read: function that reads the text of an argument with a special form. It raises ValueError
             for an invalid text.
+        bare: whether the argument may be written without its name.
     """
 
     name: str
@@ -65,6 +66,7 @@ class FaultArgument(Immutable):
     high: int = _MOST
     choices: tuple[str, ...] = ()
     read: Callable[[str], Any] | None = None
+    bare: bool = True
 
     @property
     def range(self) -> str:
@@ -115,6 +117,9 @@ WAY: Final = FaultArgument(
 )
 """Argument of port faults that act in one direction by default."""
 
+EITHER_WAY: Final = replace(WAY, default="both", bare=False)
+"""Argument of port faults that act in both directions by default; a bare word is their rate."""
+
 
 @dataclass(frozen=True, slots=True)
 class FaultForm(Immutable):
@@ -124,7 +129,7 @@ class FaultForm(Immutable):
         text: description as readable text.
         rated: whether the fault accepts `rate=` and `count=`.
         arguments: arguments of the fault itself, in the order in which they are written without
-            keywords.
+            keywords, if they are `bare`.
         usual_rate: default rate.
     """
 
@@ -140,6 +145,12 @@ class FaultForm(Immutable):
             return self.arguments
         rate = FaultArgument(_RATE, RATE.text, f"{self.usual_rate:g}", "above 0 to 1", read=float)
         return (*self.arguments, rate, COUNT)
+
+    @property
+    def bare(self) -> list[str]:
+        """The names of its arguments that may be written without their names, in this order."""
+        own = [each.name for each in self.arguments if each.bare]
+        return own or [_RATE] * self.rated
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +180,7 @@ def usage(name: str, form: FaultForm) -> str:
     >>> usage("drop", FaultForm("")), usage("cut", FaultForm("", rated=False))
     ('drop[=RATE]', 'cut')
     """
-    words = [each.name for each in form.arguments] or [_RATE] * form.rated
+    words = form.bare
     return f"{name}[={','.join(words).upper()}]" if words else name
 
 
@@ -202,11 +213,11 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
 
 def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
     """Return the given arguments by name; raise ValueError as `bind_arguments` does."""
-    known = {each.name: each for each in form.all_arguments}
-    if words and not known:
-        hint = "; clear ends it" if tuple(words) == ("0",) else ""
+    known, free = {each.name: each for each in form.all_arguments}, form.bare
+    if words and not (free or (known and "=" in words[0])):
+        hint = "".join(f"; write {each.name}={each.choices[0]}" for each in known.values())
+        hint = "; clear ends it" if tuple(words) == ("0",) else hint
         raise ValueError(f"{name} takes no argument, got {','.join(words)}{hint}")
-    free = [each.name for each in form.arguments] or [_RATE]
     given: dict[str, str] = {}
     for word in words:
         key, keyed, value = word.partition("=")

@@ -16,8 +16,8 @@
 # bit (`sent`). Late bytes are sent in a tick of the device, so their times are rounded up to its
 # `tick_us`.
 #
-# flip, drop, dup and cut act in both directions. The others act on the bytes that the device
-# sends, on those it receives, or on both (`way=`). They act by the byte, by the line or by the
+# Each fault acts on the bytes that the device sends, on those it receives, or on both (`way=`).
+# flip, drop, dup and cut act on both by default. The others act by the byte, by the line or by the
 # frame (`by=`). A line ends with a line feed. A frame is all bytes that the device sends or
 # receives in one tick: an answer, if the device sends each answer in one piece.
 
@@ -32,6 +32,7 @@ from itertools import pairwise
 from typing import Final
 
 from tickrig.emulators.rig.faults import (
+    EITHER_WAY,
     WAY,
     FaultArgument,
     FaultArguments,
@@ -289,10 +290,10 @@ _PIECES: Final = FaultArgument("pieces", "how many", "2", "pieces", 2, 4_096)
 _FRAME: Final = _by("frame")
 
 BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
-    "flip": FaultType("each bit is inverted at this rate", _Flip),
-    "drop": FaultType("each byte is lost at this rate", _Drop),
-    "dup": FaultType("each byte arrives twice at this rate", _Dup),
-    "cut": FaultType("nothing passes", _Cut, rated=False),
+    "flip": FaultType("each bit is inverted at this rate", _Flip, arguments=(EITHER_WAY,)),
+    "drop": FaultType("each byte is lost at this rate", _Drop, arguments=(EITHER_WAY,)),
+    "dup": FaultType("each byte arrives twice at this rate", _Dup, arguments=(EITHER_WAY,)),
+    "cut": FaultType("nothing passes", _Cut, rated=False, arguments=(EITHER_WAY,)),
     "delay": FaultType(
         "an answer comes late", _Delay, arguments=(_time("time", "how late", "100ms"), _FRAME, WAY)
     ),

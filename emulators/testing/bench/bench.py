@@ -148,8 +148,8 @@ class BenchDevice:
         """Start a fault: now, at a time, or when a condition becomes true.
 
         Args:
-            spec: the fault of the device or of its wire, such as `cut`, `cut@2s-3s` or
-                `flip=0.001`.
+            spec: the fault of the device or of its wire, such as `cut`, `cut@2s-3s`,
+                `cut@+1s-+2s` with times from now, or `flip=0.001`.
             when: condition that starts the fault, such as `on_line("OK:output", nth=3)`. With a
                 condition, `spec` must not have a time.
             for_: duration from the start of the fault. By default the fault stays.
@@ -158,7 +158,8 @@ class BenchDevice:
             ValueError: the fault is unknown, or its arguments are invalid.
             NotOnThisBench: the bench cannot make the fault.
         """
-        wanted = parse_fault_spec(spec, partial(self._mode.check_fault, self.name))
+        check = partial(self._mode.check_fault, self.name)
+        wanted = parse_fault_spec(spec, check, self._mode.now_us)
         for_us = None if for_ is None else us_of(for_)
         if when is not None:
             tasks.check_condition(when)

@@ -87,6 +87,9 @@ def _bare(name: str, known: Mapping[str, Any]) -> str:
     form = known.get(bare)
     if not (has_words and isinstance(form, FaultForm) and form.arguments):
         return name
+    named = {word.partition("=")[0] for word in words.split(",")}
+    if form.bare == ["rate"] and named.isdisjoint(each.name for each in form.arguments):
+        return name
     bind_arguments(bare, form, words.split(","))
     return bare
 

@@ -100,7 +100,7 @@ def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
         name = draw(st.sampled_from(list(world.faults)))
         form = world.faults[name]
         rate = draw(st.sampled_from(_RATES)) if form.rated and "rate=" not in name else ""
-        if form.arguments and rate:  # a bare word is one of them
+        if rate and form.bare != ["rate"]:  # a bare word is another argument
             rate = "" if rate == "1" else f"rate={rate}"
         rate = f"{',' if '=' in name else '='}{rate}" if rate else ""
         return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))

@@ -76,6 +76,13 @@ def test_faults_of_wire_and_device_come_and_go(emulator: Emulator) -> None:
     assert ask(emulator, "status")["faults"] == ""
 
 
+def test_a_fault_comes_some_time_from_now_on(emulator: Emulator) -> None:
+    for _ in range(5):
+        emulator.step()
+    assert ask(emulator, "fault", spec="dead@+10ms-+30ms")["ok"]
+    assert emulator.event_queue.due_us == emulator.effective_us + 10_000
+
+
 def test_lines_are_those_of_the_wire(emulator: Emulator) -> None:
     for _ in range(5):
         emulator.step()

@@ -258,7 +258,8 @@ def test_the_range_and_the_default_of_each_argument_can_be_read() -> None:
         "rate": ("1", "above 0 to 1"),
         "count": ("always", "1 to 1000000"),
     }
-    assert BYTE_FAULTS["cut"].all_arguments == ()
+    assert [each.name for each in BYTE_FAULTS["cut"].all_arguments] == ["way"]
+    assert CAN_FAULTS["short"].all_arguments == ()
 
 
 TABLES: dict[str, Mapping[str, FaultForm]] = {

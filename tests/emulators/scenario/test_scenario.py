@@ -104,6 +104,14 @@ def test_a_bad_line_says_where_and_what_is_allowed(line: str, error: str) -> Non
     assert error in str(caught.value)
 
 
+def test_a_fault_may_be_timed_from_its_line_on() -> None:
+    steps = parse("1 fault dead@+500ms-+2s\n+1 fault cut@+1", Emulator("lamp", Lamp()))
+    assert [what for _, what in steps] == [
+        FaultSpec("dead", (), 1_500_000, 3_000_000),
+        FaultSpec("cut", (), 3_000_000),
+    ]
+
+
 def test_reading_a_scenario_touches_nothing() -> None:
     emulator = Emulator("lamp", Lamp())
     parse("0 set place 1 2\n0 press key\n0 fault dead\n0 fault cut", emulator)

@@ -59,6 +59,19 @@ def test_a_fault_is_one_word(text: str, spec: FaultSpec) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "from_us", "to_us"),
+    [
+        ("cut@+100ms-+2s", 5_100_000, 7_000_000),
+        ("cut@+0", 5_000_000, NEVER),
+        ("cut@6s-+2s", 6_000_000, 7_000_000),
+        ("cut@+1s-7s", 6_000_000, 7_000_000),
+    ],
+)
+def test_a_time_with_a_plus_is_from_now_on(text: str, from_us: int, to_us: int) -> None:
+    assert parse_fault_spec(text, now_us=5_000_000) == FaultSpec("cut", (), from_us, to_us)
+
+
+@pytest.mark.parametrize(
     ("text", "error"),
     [
         ("", "is not a fault: write NAME"),
@@ -67,6 +80,9 @@ def test_a_fault_is_one_word(text: str, spec: FaultSpec) -> None:
         ("cut@5s-", "'' is not a time"),
         ("cut@5s-x", "'x' is not a time"),
         ("cut@5s-5s", "ends before it begins"),
+        ("cut@+", "'' is not a time"),
+        ("cut@++1s", r"'\+1s' is not a time"),
+        ("cut@+2s-+1s", "ends before it begins"),
     ],
 )
 def test_a_bad_fault_says_what_came(text: str, error: str) -> None:

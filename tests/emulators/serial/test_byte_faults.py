@@ -18,8 +18,10 @@ from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusException
 
 from tests.emulators.changing import Changing
+from tests.emulators.echo import Echo
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.commands.run_options import SERIAL_FAULTS
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
@@ -51,6 +53,49 @@ def answered(bench: Bench, *requests: bytes, timeout_s: float = 0.05) -> list[by
         heard.append(port.readline())
     port.close()
     return heard
+
+
+@pytest.mark.parametrize(
+    ("fault", "received", "heard"),
+    [
+        ("cut", b"", b""),
+        ("cut=way=answer", b"ab\n", b""),
+        ("cut=way=request", b"", b""),
+        ("drop=way=answer", b"ab\n", b""),
+        ("drop=1,way=request", b"", b""),
+        ("dup=way=answer", b"ab\n", b"aabb\n\n"),
+        ("dup=way=request,rate=1", b"aabb\n\n", b"aabb\n\n"),
+        ("dup=way=both", b"aabb\n\n", b"aaaabbbb\n\n\n\n"),
+        ("flip=way=answer", b"ab\n", bytes(byte ^ 0xFF for byte in b"ab\n")),
+        ("flip=way=request", *2 * [bytes(byte ^ 0xFF for byte in b"ab\n")]),
+    ],
+)
+def test_a_fault_acts_in_one_direction_alone(fault: str, received: bytes, heard: bytes) -> None:
+    echo, line, spec = Echo(), SerialLine(), parse_fault_spec(fault)
+    port = FaultyPort(line.a, BYTE_FAULTS)
+    rig = Rig(Station(echo, port))
+    port.arm(spec.name, *spec.arguments)
+    line.b.send(0, b"ab\n")
+    rig.run_for(50_000)
+    assert (echo.heard, line.b.poll(rig.now_us)) == (received, heard)
+
+
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [
+        ("cut=0.5", "cut takes no argument, got 0.5; write way=answer"),
+        ("cut=0", "cut takes no argument, got 0; clear ends it"),
+        ("cut=way=up", "cut: way 'up' is not answer or request or both"),
+        ("cut=rate=0.5", "cut has no argument 'rate'"),
+        ("drop=answer", "'answer' is not a rate"),
+        ("drop=0.1,answer", r"'answer' is one argument too many: drop\[=RATE\]"),
+    ],
+)
+def test_a_direction_needs_its_name(fault: str, error: str) -> None:
+    port, spec = FaultyPort(SerialLine().a, BYTE_FAULTS), parse_fault_spec(fault)
+    with pytest.raises(ValueError, match=error):
+        port.arm(spec.name, *spec.arguments)
+    assert port.armed == ()
 
 
 @pytest.mark.parametrize(

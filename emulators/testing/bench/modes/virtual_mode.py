@@ -89,7 +89,7 @@ class _WaitLimit(HostLimit):
     def __init__(self, limit_us: int, now_us: int) -> None:
         self.limit_us, self.refused = limit_us, ""
         self._most_parts = -(-limit_us // _PART_US)
-        self._asked, self._asked_us = 0, now_us
+        self._requests, self._request_us = 0, now_us
         self._first_us = limit_us - (self._most_parts - 1) * _PART_US  # the shortest
         self.restart(now_us)
 
@@ -128,16 +128,16 @@ class _WaitLimit(HostLimit):
         if self._looks > _MOST_LOOKS and self.limit_us < NEVER:
             self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
 
-    def ask(self, now_us: int) -> None:
+    def count_request(self, now_us: int) -> None:
         """Count a request of the test.
 
         Raises:
             HostHangsError: there were too many at one instant.
         """
-        if now_us != self._asked_us:
-            self._asked, self._asked_us = 0, now_us
-        self._asked += 1
-        if self._asked > _MOST_GETS and self.limit_us < NEVER:
+        if now_us != self._request_us:
+            self._requests, self._request_us = 0, now_us
+        self._requests += 1
+        if self._requests > _MOST_GETS and self.limit_us < NEVER:
             self._refuse(now_us, f"has asked the bench {_MOST_GETS} times at one instant")
 
     def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None = None) -> NoReturn:
@@ -332,7 +332,7 @@ class VirtualMode(EmulatedMode):
 
     def request(self, do: str, **fields: object) -> Object:
         """Execute a request of the control socket; ValueError if it is refused."""
-        self._limit.ask(self._rig.rig.now_us)
+        self._limit.count_request(self._rig.rig.now_us)
         return super().request(do, **fields)
 
     def run_for(self, duration_us: int) -> None:

@@ -172,6 +172,15 @@ def test_what_cannot_be_is_told(act, text: str) -> None:  # type: ignore[no-unty
         act(bench)
 
 
+def test_a_fault_comes_some_time_from_now_on() -> None:
+    with Bench(Rrc()) as bench:
+        bench.run_for("1s")
+        bench.fault("cut@+100ms-+300ms")
+        bench.run_for("1s")
+        cuts = [line for line in bench.transcript().splitlines() if " ! cut" in line]
+        assert cuts == ["1.100000 rrc ! cut", "1.300000 rrc ! cut=0"]
+
+
 def test_a_fault_comes_with_a_line() -> None:
     with Bench(Rrc()) as bench, RrcClient(bench.link) as client:
         client.start()

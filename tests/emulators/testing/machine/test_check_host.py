@@ -372,7 +372,7 @@ def test_a_fault_may_be_named_with_its_arguments() -> None:
     seen: set[str] = set()
 
     class Watched(Noisy):
-        faults = ("delay=30ms", "truncate=1,rate=0.5")
+        faults = ("delay=30ms", "truncate=1,rate=0.5", "drop=way=answer")
 
         def end(self) -> None:
             lines = self.bench.transcript().splitlines()
@@ -380,6 +380,7 @@ def test_a_fault_may_be_named_with_its_arguments() -> None:
 
     check_host(Watched, max_examples=60, seed=1)
     assert {"delay=30ms", "delay=30ms,rate=0.1", "truncate=1,rate=0.5"} <= seen
+    assert {"drop=way=answer,0.1", "drop=way=answer"} & seen
     assert not any(each.startswith("truncate=1,rate=0.5,") for each in seen)
 
     class Wrong(Noisy):
