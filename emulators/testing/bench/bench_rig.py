@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -163,9 +164,18 @@ class Journal(WireLog):
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return the kept lines, with the frames that only a silence will end."""
+        """Return the kept lines in order of time, with the frames that only a silence will end.
+
+        An action counts from the next tick of its device on. Therefore the action is added before
+        frames that end earlier.
+        """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
-        return (*self.since(0), *(replace(line, number=number) for number, line in begun))
+        lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
+        ordered = sorted(lines, key=attrgetter("at_us"))
+        return tuple(
+            line if line.number == added.number else replace(line, number=added.number)
+            for added, line in zip(lines, ordered, strict=True)
+        )
 
     def mappings(self) -> tuple[WireLine, ...]:
         """Return earlier frames that define the contents of PDOs."""

@@ -172,6 +172,21 @@ def test_what_cannot_be_is_told(act, text: str) -> None:  # type: ignore[no-unty
         act(bench)
 
 
+def test_actions_stand_in_order_of_time() -> None:
+    with Bench(a=make_epos(1), b=make_f_palette(5)) as bench:
+        bench.run_for("100200us")
+        bench["b"].fault("power_off")
+        bench.link.send((CanFrame.parse("601#4000100000000000"),))
+        bench.run_for("50ms")
+        lines = bench.transcript().splitlines()[2:]
+    assert [" ".join(line.split()[:4]) for line in lines] == [
+        "0.100321 can < 601#4000100000000000",
+        "0.101000 b ! power_off=1",
+        "0.101117 can < 581#4300100092010200",
+    ]
+    assert [line.number for line in bench._mode.journal()] == [1, 2, 3, 4, 5]
+
+
 def test_a_fault_comes_some_time_from_now_on() -> None:
     with Bench(Rrc()) as bench:
         bench.run_for("1s")
