@@ -114,6 +114,14 @@ class Chair(BenchTestCase):
     def test_it_has_a_terminal(self) -> None:
         self.bench.start(self.wrong())
 
+    def test_its_host_hangs(self) -> None:
+        port = self.bench.serial(timeout=60)
+        try:
+            while True:
+                port.read()
+        except AssertionError:
+            pass
+
     async def wrong(self) -> None:
         raise ZeroDivisionError
 
@@ -153,6 +161,11 @@ def test_a_failure_has_what_passed_last() -> None:
 def test_a_task_that_failed_fails_the_test() -> None:
     ((_, said),) = ran("test_it_has_a_terminal").errors
     assert "ZeroDivisionError" in said
+
+
+def test_a_host_that_hangs_fails_the_test_although_it_catches_the_error() -> None:
+    ((_, said),) = ran("test_its_host_hangs").failures
+    assert ": the host has waited for 3600.000000 s of virtual time" in said
 
 
 def test_marks_of_unittest_count() -> None:
