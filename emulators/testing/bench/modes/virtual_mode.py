@@ -54,6 +54,9 @@ _MOST_LOOKS: Final = 2_000_000
 """Largest number of reads of the clock between two calls of the test, and of waits that take no
 time; they take some seconds."""
 
+_MORE_LOOKS: Final = 1_000
+"""After the error, until it is raised again."""
+
 _MOST_GETS: Final = 1_000_000
 """Largest number of requests, such as `get`, at one instant; they take some seconds."""
 
@@ -110,6 +113,8 @@ class _WaitLimit(HostLimit):
             HostHangsError: the limit is reached.
         """
         if self._parts <= 1:
+            # What ends the test, such as a fixture, may wait a little.
+            self.due_us = now_us + min(self.limit_us, _PART_US)
             waited = f"has waited for {format_time(self.limit_us)} s of virtual time"
             self._refuse(now_us, waited, where)
         self._parts -= 1
@@ -126,6 +131,7 @@ class _WaitLimit(HostLimit):
         """
         self._looks += 1
         if self._looks > _MOST_LOOKS and self.limit_us < NEVER:
+            self._looks -= _MORE_LOOKS
             self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
 
     def count_request(self, now_us: int) -> None:
@@ -138,14 +144,17 @@ class _WaitLimit(HostLimit):
             self._requests, self._request_us = 0, now_us
         self._requests += 1
         if self._requests > _MOST_GETS and self.limit_us < NEVER:
+            self._requests = 0
             self._refuse(now_us, f"has asked the bench {_MOST_GETS} times at one instant")
 
     def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None = None) -> NoReturn:
-        place = (where() if where else host_place(sys._getframe(1))) or "a host"
+        place = (where() if where else host_place(sys._getframe())) or "a host"
         text = f"{place}: the host {what}, up to {format_time(now_us)} s, {_ENDLESS}"
         self.refused = self.refused or text
         self._caught += 1
-        raise (HostHangsError if self._caught <= _MOST_CAUGHT else _CaughtError)(text)
+        if self._caught > _MOST_CAUGHT:
+            raise _CaughtError(self.refused)
+        raise HostHangsError(text)
 
 
 class RigPassing:

@@ -268,6 +268,24 @@ def test_a_host_that_catches_the_error_is_ended_too() -> None:
     assert len(errors) == 100
 
 
+def test_what_ends_a_test_may_wait_after_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(virtual_mode, "_MOST_LOOKS", 2_000)
+    monkeypatch.setattr(virtual_mode, "_MORE_LOOKS", 10)
+    with Bench(make_f_palette(5), limit="90s") as bench, bench.patched_time():
+        with bench.can_bus() as bus:
+            for _ in range(2):
+                with pytest.raises(HostHangsError):
+                    poll(bus, never)
+                raised_us = bench.now_us
+                poll(bus, lambda: bench.now_us > raised_us + 59_000_000)  # noqa: B023 - called here
+        bench.run_for("1s")
+        for _ in range(2):
+            with pytest.raises(HostHangsError):
+                read_clock()
+            for _ in range(9):
+                time.monotonic()
+
+
 def test_a_fork_and_a_restored_bench_have_the_limit() -> None:
     def polled_us(bench: Bench) -> int:
         before_us = bench.now_us
