@@ -130,7 +130,7 @@ class Ground(Part):
 _Pair = tuple[float, float]
 
 
-class BaseState(NamedTuple):
+class _BaseState(NamedTuple):
     """Observable state of a base; pairs are for the left and right wheel unless stated otherwise.
 
     Attributes:
@@ -152,7 +152,7 @@ class BaseState(NamedTuple):
     frames: tuple[int, int]
 
 
-_READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
+_READ: Final[Mapping[str, Callable[[_BaseState], float]]] = {
     "x_m": lambda state: state.pose.x_m,
     "y_m": lambda state: state.pose.y_m,
     "heading_rad": lambda state: state.pose.heading_rad,
@@ -290,9 +290,9 @@ class Rh3Base(Copyable):
         self._driver.power_up()
         self.slave.reset()
 
-    def _observed(self) -> BaseState:
+    def _observed(self) -> _BaseState:
         ground, (left, right) = self.ground, self.sides
-        return BaseState(
+        return _BaseState(
             ground.pose,
             (ground.speed_m_s, ground.turn_rad_s),
             (left.wheel.travel, right.wheel.travel),

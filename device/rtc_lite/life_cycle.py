@@ -11,7 +11,7 @@ from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
 
 
-class LiteTransition(NamedTuple):
+class _LiteTransition(NamedTuple):
     """Effect of a command, with the allowed state, the callback and the next state."""
 
     begin: LiteState
@@ -20,27 +20,27 @@ class LiteTransition(NamedTuple):
     bad: LiteState
 
 
-_TRANSITIONS: Final[Mapping[LiteCommand, LiteTransition]] = MappingProxyType(
+_TRANSITIONS: Final[Mapping[LiteCommand, _LiteTransition]] = MappingProxyType(
     {
-        LiteCommand.INITIALIZE: LiteTransition(
+        LiteCommand.INITIALIZE: _LiteTransition(
             LiteState.CREATED, "on_initialize", LiteState.INACTIVE, LiteState.CREATED
         ),
-        LiteCommand.ACTIVATE: LiteTransition(
+        LiteCommand.ACTIVATE: _LiteTransition(
             LiteState.INACTIVE, "on_activated", LiteState.ACTIVE, LiteState.ERROR
         ),
-        LiteCommand.EXECUTE: LiteTransition(
+        LiteCommand.EXECUTE: _LiteTransition(
             LiteState.ACTIVE, "on_execute", LiteState.ACTIVE, LiteState.ERROR
         ),
-        LiteCommand.DEACTIVATE: LiteTransition(
+        LiteCommand.DEACTIVATE: _LiteTransition(
             LiteState.ACTIVE, "on_deactivated", LiteState.INACTIVE, LiteState.ERROR
         ),
-        LiteCommand.ERROR: LiteTransition(
+        LiteCommand.ERROR: _LiteTransition(
             LiteState.ERROR, "on_error", LiteState.ERROR, LiteState.ERROR
         ),
-        LiteCommand.RESET: LiteTransition(
+        LiteCommand.RESET: _LiteTransition(
             LiteState.ERROR, "on_reset", LiteState.INACTIVE, LiteState.ERROR
         ),
-        LiteCommand.FINALIZE: LiteTransition(
+        LiteCommand.FINALIZE: _LiteTransition(
             LiteState.INACTIVE, "on_finalize", LiteState.NONE, LiteState.INACTIVE
         ),
     }

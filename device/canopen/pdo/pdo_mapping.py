@@ -186,7 +186,7 @@ def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
             yield from (entry.number for entry in used if entry.number)
 
 
-class MpdoQueue(TpdoMode):
+class _MpdoQueue(TpdoMode):
     """MPDOs in the order of events, with one frame per object and per inhibit time.
 
     An event of an object whose frame is already waiting adds no frame. The frame is sent with the
@@ -226,7 +226,7 @@ class MpdoQueue(TpdoMode):
         return pdo.Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
 
 
-class DamProducer(MpdoQueue):
+class DamProducer(_MpdoQueue):
     """MPDO in destination address mode: the application chooses object and destination.
 
     The MPDO does not use its own mapping entry.
@@ -237,7 +237,7 @@ class DamProducer(MpdoQueue):
         self.put((node_id, index, sub), pdo.Mpdo(True, node_id, index, sub, data).encode())
 
 
-class SamProducer(MpdoQueue):
+class SamProducer(_MpdoQueue):
     """MPDO in source address mode: each change of an object of the scanner lists is sent."""
 
     def request(self, entry: Entry | None = None) -> None:

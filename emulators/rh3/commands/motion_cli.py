@@ -105,7 +105,7 @@ def goto(x: float, y: float, theta: float, **options: Any) -> None:
 @_PLOT
 @_SHARED
 @works_in(f"{_WORK}:go_along")
-def along_path(file: Path, **options: Any) -> None:
+def _along_path(file: Path, **options: Any) -> None:
     """Drive along the points of FILE, whose lines have x, y in metres, and a heading in radians.
 
     Only the heading of the last point counts.

@@ -350,7 +350,7 @@ class Bench(BenchDevice, Closing):
             raise ValueError("a bench has at least one device")
         sdo_timeout_us = None if sdo_timeout is None else us_of(sdo_timeout)
         parts = Parts(mounts=plan_parts.mounts_of(named, seed, line, sdo_timeout_us), seed=seed)
-        self._start(_emulated(mode, parts, RigPlan(), limit_us_of(limit)))
+        self._start(_emulated(mode, parts, RigPlan(), _limit_us_of(limit)))
 
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
@@ -383,7 +383,7 @@ class Bench(BenchDevice, Closing):
         """
         if mode == HARDWARE:
             return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
-        return cls.of_mode(_emulated(mode, plan_parts.parts_of(plan), plan, limit_us_of(limit)))
+        return cls.of_mode(_emulated(mode, plan_parts.parts_of(plan), plan, _limit_us_of(limit)))
 
     @classmethod
     def of_mode(cls, mode: BenchMode) -> Self:
@@ -679,13 +679,13 @@ def open_bench(
     return Bench.of_plan(plan, mode, limit=limit)
 
 
-def limit_us_of(limit: Duration) -> int:
+def _limit_us_of(limit: Duration) -> int:
     """Return a limit in microseconds, `NEVER` if there is none.
 
     Raises:
         ValueError: it is not a time.
 
-    >>> limit_us_of("2s"), limit_us_of("none") == limit_us_of(0) == NEVER
+    >>> _limit_us_of("2s"), _limit_us_of("none") == _limit_us_of(0) == NEVER
     (2000000, True)
     """
     return NEVER if limit == _NO_LIMIT else us_of(limit) or NEVER

@@ -14,7 +14,7 @@ from tickrig.wire.canopen.drive import Statusword
 _STEP_US: Final = 1_000
 
 
-class LatchedSetPoint(Mode):
+class _LatchedSetPoint(Mode):
     """Follows a set-point that stays valid until another set-point is written.
 
     At the start the mode brakes, and the object of the set-point shows the reference. So nothing
@@ -72,7 +72,7 @@ class LatchedSetPoint(Mode):
         return stands
 
 
-class CyclicPosition(LatchedSetPoint):
+class CyclicPosition(_LatchedSetPoint):
     """Moves to the target position within an interpolation period, on a straight line.
 
     A SYNC begins a new line. Without SYNC, another target begins a new line, too. At the end of the
@@ -231,7 +231,7 @@ _VELOCITY_SETTING: Final = 0x206B
 SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
 
 
-class _PositionSetting(LatchedSetPoint):
+class _PositionSetting(_LatchedSetPoint):
     """Position mode, -1, which moves to 2062h, in position units.
 
     Bit 8 of the controlword has no effect in these modes (DECISION K21).

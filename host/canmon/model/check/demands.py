@@ -489,7 +489,7 @@ _Pair = tuple[str, int | None]
 """A bus, and a node if the node relates the events."""
 
 
-class DeadlineDemand(RuleDemand):
+class _DeadlineDemand(RuleDemand):
     """Demand for a reaction within a time after each frame that requires it.
 
     Args:
@@ -538,7 +538,7 @@ class DeadlineDemand(RuleDemand):
         return record.at_us + self._most_us
 
 
-class Latency(DeadlineDemand):
+class Latency(_DeadlineDemand):
     """Demand for an event within a time after another event.
 
     If the first event occurs again before the second one, time counts from its earlier occurrence.
@@ -567,7 +567,7 @@ class Latency(DeadlineDemand):
         return None
 
 
-class Answered(DeadlineDemand):
+class Answered(_DeadlineDemand):
     """Demand for an answer within a time after a request of an SDO client or a guarding master.
 
     For a repeated request, time counts from the first one.

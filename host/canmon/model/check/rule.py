@@ -573,7 +573,7 @@ _NAMED_BYTES: Final = 4
 """An SDO frame of at least this many bytes names its object."""
 
 
-class CanopenRule(Rule):
+class _CanopenRule(Rule):
     """Rule against frames that should not occur, among frames that may be CANopen frames."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
@@ -581,7 +581,7 @@ class CanopenRule(Rule):
         return evidence.without_canopen
 
 
-class NoEmcy(CanopenRule):
+class NoEmcy(_CanopenRule):
     """Rule against EMCY messages except error reset, on the default COB-IDs.
 
     Short EMCYs count too.
@@ -615,7 +615,7 @@ class NoEmcy(CanopenRule):
             yield f"{counted(self._cut, 'frame')} of EMCY without a whole error code"
 
 
-class NoSdoAbort(CanopenRule):
+class NoSdoAbort(_CanopenRule):
     """Rule against aborted transfers at default SDO servers.
 
     An abort that is too short counts too.
@@ -734,7 +734,7 @@ class NodesPresent(Rule):
                 yield f"node {node} was never seen"
 
 
-class NoReboot(CanopenRule):
+class NoReboot(_CanopenRule):
     """Rule that no node that was already active boots without an NMT reset.
 
     Any frame that begins with 0 counts as a boot-up, because some nodes send more than one byte.

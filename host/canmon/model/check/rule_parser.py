@@ -106,7 +106,7 @@ _Slice = tuple[str, FrameSlice]
 """Bits of a frame, under the name that a rule uses."""
 
 
-class SliceParser(FilterParser):
+class _SliceParser(FilterParser):
     """Parser that accepts slices of frames in places where a filter has signals.
 
     Args:
@@ -367,7 +367,7 @@ _UNITS: Final = ("s", "ms", "us", "%")
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
-class _QuantityParser(SliceParser):
+class _QuantityParser(_SliceParser):
     """Parser of quantities in the words of a rule.
 
     Args:
