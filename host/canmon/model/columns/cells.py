@@ -210,6 +210,17 @@ def whole(numbers: npt.NDArray[np.int64]) -> list[Part]:
     return [where(numbers < 0, b"-"), _digits(np.abs(numbers))]
 
 
+def hexadecimal(numbers: npt.NDArray[np.int64], count: int) -> Cells:
+    """Write the lower bytes of numbers, two digits for each of them."""
+    octets = numbers.astype(">u8").view(np.uint8).reshape(-1, 8)[:, 8 - count :]
+    return of(_pairs()[octets])
+
+
+@lru_cache(1)
+def _pairs() -> npt.NDArray[np.uint16]:
+    return table([f"{octet:02X}" for octet in range(256)], "<u2")
+
+
 def _digits(numbers: npt.NDArray[np.int64]) -> Cells:
     most, rest, begins = int(numbers.max(initial=0)), numbers, _begins()
     if most >> 32 == 0:

@@ -96,6 +96,13 @@ COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
 _IDENTITY: Final = 0x1018
 _LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
+TEACHING: Final = frozenset(
+    {
+        *(node_memory.DEVICE_TYPE[0], node_memory.HEARTBEAT_TIME[0], node_memory.STORE, _IDENTITY),
+        *(COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS, *PDO_OBJECTS),
+    }
+)
+"""Objects whose value can change what other frames mean, as 6041h can if it was never seen."""
 _PRE_DEFINED: Final[dict[int, Route]] = {
     NMT_COB_ID: services.decode_nmt,
     _SYNC_ID: services.decode_sync,
@@ -127,7 +134,8 @@ class BusDecoder:
 
     Attributes:
         changes: number of possible changes of the meaning of a CAN-ID.
-        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set has got another meaning.
+        renamed: number of possible changes of the description of an object.
+        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set got another meaning.
     """
 
     def __init__(
@@ -136,7 +144,7 @@ class BusDecoder:
         files: EdsFiles | None = None,
         channel: str = "",
     ) -> None:
-        self._eds, self.changes, self.sdo_moved = eds, 0, False
+        self._eds, self.changes, self.renamed, self.sdo_moved = eds, 0, 0, False
         self._files, self._channel = files, channel
         self._memories: dict[int, node_memory.NodeMemory] = {}
         self._channels: dict[tuple[int, int], SdoChannel] = {}
@@ -202,10 +210,27 @@ class BusDecoder:
         node = int(route.args[0])
         return None if node in self._guarded else partial(_unguarded, node)
 
+    def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
+        """Return the channel of a CAN-ID with SDO frames, and whether its client sends them.
+
+        It is valid until `changes` grows.
+        """
+        route = self._routes.get(can_id) or self._route(can_id)
+        if not isinstance(route, partial) or route.func != self._sdo:
+            return None
+        take = route.args[1]
+        return take.__self__, take.__name__ == "request"
+
+    def error_control(self, can_id: int) -> int | None:
+        """Return the node whose boot-ups and heartbeats a CAN-ID carries; valid as `sdo` is."""
+        route = self._routes.get(can_id) or self._route(can_id)
+        told = isinstance(route, partial) and route.func == self._error_control
+        return int(route.args[0]) if told else None  # type: ignore[attr-defined] # of a partial
+
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the running SDO transfers."""
         found = (channel.pending(now_us) for channel in self._channels.values())
-        return tuple(self._named(transfer) for transfer in found if transfer)
+        return tuple(self.named(transfer) for transfer in found if transfer)
 
     def memory(self, node: int) -> node_memory.NodeMemory:
         """Return the knowledge about a node."""
@@ -257,6 +282,7 @@ class BusDecoder:
         else:
             self._guarded.discard(node)
         if decoded.kind == "boot-up" and self.memory(node).boot():
+            self.renamed += 1
             indices = self.memory(node).indices
             self._refresh({*self._pdos.known(node), *pdos_of(node, indices)})
         return decoded
@@ -273,13 +299,13 @@ class BusDecoder:
             )
         for transfer in step.ended:
             self._learn(transfer)
-        ended = tuple(self._named(transfer) for transfer in step.ended)
+        ended = tuple(self.named(transfer) for transfer in step.ended)
         last = ended[-1]
         signals, source = _signals(last), last.source
         said = Decoded("sdo", node, None, signals, source, step.entry, ended, step.asks)
         return said._replace(flaw=step.flaw) if step.flaw else said
 
-    def _named(self, transfer: Transfer) -> Transfer:
+    def named(self, transfer: Transfer) -> Transfer:
         """Return a transfer with name and value of its object."""
         entry = transfer.entry
         text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
@@ -297,6 +323,7 @@ class BusDecoder:
             return
         if entry[0] in PDO_OBJECTS:
             self._refresh(pdos_of(transfer.node, (entry[0],)))
+        self.renamed += memory.is_drive != was_drive
         if memory.is_drive != was_drive or entry == node_memory.DEVICE_TYPE:
             self._refresh(self._pdos.known(transfer.node))
         self._learn_cob_ids(transfer.node, entry[0])
@@ -314,6 +341,7 @@ class BusDecoder:
         if found is None:
             return
         memory.eds = found
+        self.renamed += 1
         self._refresh({*self._pdos.known(node), *pdos_of(node, memory.indices)})
         for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS):
             self._learn_cob_ids(node, index)

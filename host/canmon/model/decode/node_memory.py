@@ -295,7 +295,7 @@ def _text(device: EdsDevice, row: EntryDescription) -> ObjectText:
     return ObjectText(name, row.data_type, row.unit, row.factor, decoded.EDS)
 
 
-_STORE: Final = 0x1010
+STORE: Final = 0x1010
 _SAVE: Final = b"save"
 DEVICE_TYPE: Final = (0x1000, 0)
 HEARTBEAT_TIME: Final = (0x1017, 0)
@@ -336,8 +336,8 @@ class NodeMemory:
             self._power_on[entry] = data
 
     def written(self, entry: Entry, data: bytes) -> None:
-        """Store a value that was downloaded and confirmed."""
-        if entry[0] == _STORE:
+        """Learn a value that was downloaded and confirmed."""
+        if entry[0] == STORE:
             if data == _SAVE:
                 # "save" makes all present values those of the next boot-up, the read ones
                 # too.
@@ -398,6 +398,16 @@ class NodeMemory:
         if any(entry in self._now for entry in entries):
             return decoded.SEEN
         return decoded.EDS if any(entry in self.eds.values for entry in entries) else ""
+
+    @property
+    def has_statusword(self) -> bool:
+        """Whether 16 bits of 6041h were seen."""
+        return self._has_statusword
+
+    @property
+    def boots_otherwise(self) -> bool:
+        """Whether a boot-up may change any value."""
+        return bool(self._written) or self._now != self._power_on
 
     def maps_statusword(self) -> None:
         """Record that a PDO carries 16 bits of 6041h."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final, NamedTuple
@@ -132,6 +133,12 @@ class _OpenTransfer:
         self._block[segment.seqno] = segment.data
         if segment.last:
             self.block_last = segment.seqno
+
+    def keep_segments(self, segments: Iterable[tuple[int, bytes]], last: int | None) -> None:
+        """Keep many segments, as `take_block_segment` does one."""
+        self._block.update(segments)
+        if last is not None:
+            self.block_last = last
 
     def acknowledge_block(self, ackseq: int) -> None:
         """Accept the segments that arrived in sequence. The other segments are sent again."""
@@ -419,6 +426,62 @@ class SdoChannel:
         """Return the running transfer, as if it ended now."""
         running = self._running
         return None if running is None or running.partial else _given_up(running, now_us)
+
+    # A reader of blocks takes frames that fit at once, and all others by `request` and `response`.
+
+    def turn(self) -> int:
+        """Return which request and answer continue the dialogue, if the answer follows directly.
+
+        0 if no transfer runs, 1 and 2 for an upload segment with this toggle bit plus 1, 3 and 4
+        for a download segment with this toggle bit plus 3, -1 for all else.
+        """
+        running = self._running
+        if running is None:
+            return 0
+        taken, upload = running.taken, running.direction is TransferDirection.UPLOAD
+        waits = running.requested_toggle != taken if upload else running.sent is not None
+        begins = taken is None and running.partial
+        if running.phase is not _TransferPhase.SEGMENTS or waits or begins:
+            return -1
+        return (1 if upload else 3) + (taken is False)
+
+    def received(self) -> tuple[int, int]:
+        """Return how many bytes of the running transfer have come, and its size, 0 if unknown."""
+        running = self._running
+        return (0, 0) if running is None else (len(running.data), running.size or 0)
+
+    def runs(self) -> tuple[int, int] | None:
+        """Return the object of the running transfer, if it was answered and may still end well."""
+        running = self._running
+        if running is None or running.phase is _TransferPhase.ASKED:
+            return None
+        return running.entry
+
+    def take_segments(self, data: bytes, toggle: bool) -> None:
+        """Take segments with their answers, which continue the dialogue; `toggle` is the last."""
+        running = self._running
+        assert running is not None, "a transfer runs"
+        running.data += data
+        running.taken, running.sent = toggle, None
+        if running.direction is TransferDirection.UPLOAD:
+            running.requested_toggle = toggle
+
+    def end_exchanges(self) -> None:
+        """Take transfers, each complete and without a repetition."""
+        self._running = self._latest = None
+
+    def block_from(self) -> TransferDirection | None:
+        """Return the direction of the segments of a block that come, before the last of them."""
+        running = self._running
+        if running is None or running.phase is not _TransferPhase.BLOCK:
+            return None
+        return running.direction if running.block_last is None else None
+
+    def take_block(self, segments: Iterable[tuple[int, bytes]], last: int | None) -> None:
+        """Take segments of a block, by number; `last` is the number of the last of the transfer."""
+        running = self._running
+        assert running is not None, "a transfer runs"
+        running.keep_segments(segments, last)
 
     def request(self, at_us: int, data: bytes) -> SdoStep:
         """Process a frame of the client."""
