@@ -146,7 +146,8 @@ class Texts:
         found = joined(len(texts), [*parts, texts, b"\n"])
         if not self._wide or _MARK not in found:
             return found
-        wide = [self._wide[row] for row in range(*rows.indices(self._count)) if row in self._wide]
+        here = range(*rows.indices(self._count))
+        wide = [self._wide[row] for row in sorted(row for row in self._wide if row in here)]
         between = found.split(_MARK)
         return "".join([part for pair in zip(between, [*wide, ""], strict=True) for part in pair])
 

@@ -28,6 +28,7 @@ from tickrig.host.canmon.model.decode.decoder import (
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
 from tickrig.host.canmon.model.decode.sdo import SdoChannel
+from tickrig.host.canmon.model.decode.services import decode_error_control
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record, decoded_text
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX, CanFrame
@@ -131,7 +132,7 @@ class ColumnMeanings:
         """Decode data and remote frames with 11-bit identifiers, whose places are other rows."""
         begin, lessons = 0, _Lessons(bus, frames, 0)
         while begin < len(frames):
-            if lessons.known != (bus.changes, bus.renamed):
+            if lessons.version != bus.version:
                 lessons = _Lessons(bus, frames, begin)
             end = lessons.next(begin)
             if end - begin >= _SETTLED:
@@ -149,10 +150,10 @@ class ColumnMeanings:
         while row < min(end, len(frames)):
             piece = select(frames, slice(row, min(end, len(frames))))
             for record in records(piece):
-                before = bus.changes
+                before = bus.version
                 texts.put_one(int(places[row]), _text(self._decoder, record))
                 row += 1
-                if bus.changes != before:
+                if bus.version != before:
                     end = row + _SETTLED
         return row
 
@@ -161,53 +162,119 @@ class ColumnMeanings:
     ) -> None:
         """Decode frames of which none changes what a CAN-ID or an object means."""
         each, speakers = list[Ints](), list[tuple[SdoChannel, bool, Ints]]()
-        for number, found in _groups(frames.ident & np.uint32(STANDARD_MAX)):
-            rows, route = found, None
+        alike = list[_Alike]()
+        for number, rows in _groups(frames.ident & np.uint32(STANDARD_MAX)):
             if speaker := bus.sdo(number):
                 speakers.append((*speaker, rows))
-                continue
-            if len(rows) >= _FEW:
-                route = bus.lasting(number)
-                if route is None and (beats := bus.heartbeat(number)):
-                    boots = frames.payload[rows] == 0
-                    if not (frames.ident[rows] & np.uint32(REMOTE)).any() and not boots.all():
-                        each.append(rows[boots])
-                        rows, route = rows[~boots], beats
-            if route is None:
+            elif len(rows) < _FEW:
                 each.append(rows)
+            elif route := bus.lasting(number):
+                layout = getattr(route, "__self__", None)
+                remote = frames.ident[rows] & np.uint32(REMOTE) != 0
+                if isinstance(layout, PdoDecoder) and not remote.any():
+                    lengths = frames.dlc[rows].astype(np.int64)
+                    write = self._pdo(layout)
+                    write(texts, places[rows], frames.payload[rows], lengths)
+                else:
+                    alike.append(_Alike(rows, route))
+            elif (node := bus.error_control(number)) is not None:
+                alike += _error_control(bus, node, frames, rows, each)
             else:
-                self._settled(route, select(frames, rows), places[rows], texts)
+                each.append(rows)
         if speakers:
             name = frames.channels[int(frames.channel[0])]
             sdo = self._sdo[name] = self._sdo.get(name) or ColumnSdo(bus)
             sdo.take(frames, speakers, places, texts)
+        if alike:
+            _take_alike(alike, frames, places, texts)
         if each:
             rows = np.sort(np.concatenate(each))
             for row, record in one_by_one(frames, rows):
                 texts.put_one(int(places[row]), _text(self._decoder, record))
 
-    def _settled(self, route: Route, frames: Columns, places: Ints, texts: cells.Texts) -> None:
-        """Write frames of one CAN-ID whose meaning does not change."""
-        layout = getattr(route, "__self__", None)
-        remote = frames.ident & np.uint32(REMOTE) != 0
-        lengths = frames.dlc.astype(np.int64)
-        if isinstance(layout, PdoDecoder) and not remote.any():
-            made = self._pdos.get(id(layout))
-            if made is None or made[0] is not layout:
-                if len(self._pdos) >= _MOST_LAYOUTS:
-                    self._pdos.clear()
-                made = self._pdos[id(layout)] = layout, _pdo_writer(layout)
-            made[1](texts, places, frames.payload, lengths)
-            return
-        payloads = frames.payload
-        if decodes_all_alike(route):
-            lengths, payloads = lengths & 0, payloads & np.uint64(0)
-        for rows in _alike(lengths | remote.astype(np.int64) << 4):
-            _, firsts, which = np.unique(payloads[rows], True, True)
-            found = records(select(frames, rows[firsts]))
-            said = [one_line(decoded_text(route(one.at_us, one.frame))) for one in found]  # type: ignore[arg-type]
-            if any(said):
-                texts.put(places[rows], cells.of_texts(said)[which])
+    def _pdo(self, layout: PdoDecoder) -> _Write:
+        """Return what writes the frames of a PDO."""
+        made = self._pdos.get(id(layout))
+        if made is None or made[0] is not layout:
+            if len(self._pdos) >= _MOST_LAYOUTS:
+                self._pdos.clear()
+            made = self._pdos[id(layout)] = layout, _pdo_writer(layout)
+        return made[1]
+
+
+class _Alike(NamedTuple):
+    """Frames of one CAN-ID whose text depends on nothing but the frame.
+
+    Attributes:
+        rows: their rows.
+        route: decodes one of them.
+    """
+
+    rows: Ints
+    route: Route
+
+
+def _error_control(
+    bus: BusDecoder, node: int, frames: Columns, rows: Ints, each: list[Ints]
+) -> list[_Alike]:
+    """Return the frames of error control of a node; boot-ups go to `each`."""
+    remote = frames.ident[rows] & np.uint32(REMOTE) != 0
+    boots = (frames.payload[rows] == 0) & (frames.dlc[rows] == 1) & ~remote
+    asked = bool(remote[-1])
+    if not bus.guarding(node) and not remote.any():
+        each.append(rows[boots])
+        return [_Alike(rows[~boots], partial(_beat, node, False))]
+    guarded = np.empty(len(rows), np.bool_)
+    guarded[0], guarded[1:] = bus.guarding(node), remote[:-1]
+    guarded &= bus.answers_guarding(node)
+    if (boots & ~guarded).any():
+        each.append(rows)
+        return []
+    bus.guard(node, asked=asked)
+    both = ((rows[guarded == one], partial(_beat, node, one)) for one in (False, True))
+    return [_Alike(*one) for one in both]
+
+
+def _beat(node: int, guarded: bool, at_us: int, frame: CanFrame) -> Decoded:
+    return decode_error_control(node, frame, guarded=guarded)
+
+
+_KINDS: Final = 17
+"""Bits of a kind of frame: 12 for the group, 4 for the length, one for remote frames."""
+
+
+def _take_alike(
+    groups: Sequence[_Alike], frames: Columns, places: Ints, texts: cells.Texts
+) -> None:
+    """Write frames of which those with the same data have one text."""
+    rows = np.concatenate([one.rows for one in groups])
+    kinds = np.repeat(np.arange(len(groups)), [len(one.rows) for one in groups]) << 5
+    plain = np.array([not decodes_all_alike(one.route) for one in groups])[kinds >> 5]
+    remote = frames.ident[rows] & np.uint32(REMOTE) != 0
+    kinds |= remote.astype(np.int64) << 4 | np.where(plain, frames.dlc[rows], 0)
+    payload = np.where(plain, frames.payload[rows], np.uint64(0))
+    short = payload >> np.uint64(64 - _KINDS) == 0
+    for chosen in (np.flatnonzero(short), np.flatnonzero(~short)):
+        if not len(chosen):
+            continue
+        keys = kinds[chosen].astype(np.uint64)
+        if short[chosen[0]]:
+            keys |= payload[chosen] << np.uint64(_KINDS)
+        else:
+            keys |= np.unique(payload[chosen], False, True)[1].astype(np.uint64) << np.uint64(
+                _KINDS
+            )
+        _, firsts, which = np.unique(keys, True, True)
+        firsts = chosen[firsts]
+        routes = [groups[number].route for number in (kinds[firsts] >> 5).tolist()]
+        said = [
+            one_line(decoded_text(route(one.at_us, one.frame)))  # type: ignore[arg-type]
+            for route, one in zip(routes, records(select(frames, rows[firsts])), strict=True)
+        ]
+        told = np.array([*map(bool, said)])[which]
+        if told.any():
+            written = cells.of_texts(said)[which]
+            texts.put(places[rows[chosen[told]]], written[told])
 
 
 class _Lessons:
@@ -219,11 +286,11 @@ class _Lessons:
         begin: the row from which on they are wanted.
 
     Attributes:
-        known: what `bus` knew then.
+        version: that of the bus then.
     """
 
     def __init__(self, bus: BusDecoder, frames: Columns, begin: int) -> None:
-        self.known = bus.changes, bus.renamed
+        self.version = bus.version
         self._bus, self._idents = bus, frames.ident & np.uint32(STANDARD_MAX)
         self._speakers: dict[int, SdoChannel] = {}
         answers, boots = list[Ints](), list[Ints]()
@@ -277,10 +344,19 @@ def _text(decoder: Decoder, record: Record) -> str:
 
 
 def _groups(numbers: npt.NDArray[np.uint32]) -> list[tuple[int, Ints]]:
-    """Return each number, and the rows with this number."""
-    found, places = np.unique(numbers, return_inverse=True)
-    order = np.argsort(places.astype(np.uint16) if len(found) < 1 << 16 else places, kind="stable")
-    cuts = np.searchsorted(places[order], np.arange(1, len(found)))
+    """Return each number, and the rows that have it."""
+    if not len(numbers):
+        return []
+    if numbers.max() < 1 << 16:
+        keys = numbers.astype(np.uint16)  # sorted in a fraction of the time
+        order = np.argsort(keys, kind="stable")
+        cuts = np.flatnonzero(np.diff(keys[order])) + 1
+        found = numbers[order[np.append(0, cuts)]]
+    else:
+        found, places = np.unique(numbers, return_inverse=True)
+        small = places.astype(np.uint16) if len(found) < 1 << 16 else places
+        order = np.argsort(small, kind="stable")
+        cuts = np.searchsorted(places[order], np.arange(1, len(found)))
     return list(zip(found.tolist(), np.split(order, cuts), strict=True))
 
 

@@ -256,7 +256,7 @@ class ColumnSdo:
     """
 
     def __init__(self, bus: BusDecoder) -> None:
-        self._bus, self._known = bus, (0, 0)
+        self._bus, self._known = bus, 0
         self._texts: dict[Any, str] = {}
         self._writers: dict[tuple[int, int, int], _ValueText] = {}
 
@@ -275,7 +275,7 @@ class ColumnSdo:
             places: the row of each frame in the texts.
             texts: the texts.
         """
-        known = self._bus.changes, self._bus.renamed
+        known = self._bus.version
         if known != self._known or len(self._texts) + len(self._writers) > _MOST_TEXTS:
             self._texts.clear()
             self._writers.clear()
@@ -551,27 +551,26 @@ class _Talk:
         if end <= row:  # an abort, as no segment has number 0
             self._one(row)
             return row + 1
-        octets = heard.word[row:end].astype("<u8").tobytes()
-        commands = octets[::_WHOLE]
-        last = None
-        if max(commands) & sdo_frame.BLOCK_LAST:
-            count = next(n for n, one in enumerate(commands, 1) if one & sdo_frame.BLOCK_LAST)
-            end, commands = row + count, commands[:count]
-            last = commands[-1] & sdo_frame.BLOCK_SEQNO
-        channel.take_block(
-            [
-                (one & sdo_frame.BLOCK_SEQNO, octets[at + 1 : at + _WHOLE])
-                for at, one in zip(range(0, _WHOLE * len(commands), _WHOLE), commands, strict=True)
-            ],
-            last,
-        )
+        commands, last = heard.word[row:end] & np.uint64(0xFF), None
+        lasts = np.flatnonzero(commands & np.uint64(sdo_frame.BLOCK_LAST))
+        if len(lasts):
+            end = row + int(lasts[0]) + 1
+            last = int(commands[end - row - 1]) & sdo_frame.BLOCK_SEQNO
+        numbers = (commands[: end - row] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.uint8)
+        data = _octets(heard.word[row:end]).tobytes()
+        channel.take_block(numbers.tobytes(), data, last)
         self.blocks.append((row, end))
         return end
 
 
+def _octets(words: _Words) -> npt.NDArray[np.uint8]:
+    """Return what follows the first byte of each frame."""
+    return np.ascontiguousarray(words, "<u8").view(np.uint8).reshape(-1, _WHOLE)[:, 1:]
+
+
 def _joined(words: _Words, lengths: Ints) -> bytes:
     """Return the data of segments."""
-    octets = np.ascontiguousarray(words).astype("<u8").view(np.uint8).reshape(-1, _WHOLE)[:, 1:]
+    octets = _octets(words)
     if (lengths == sdo_frame.SEGMENT_BYTES).all():
         return octets.tobytes()
     return octets[np.arange(sdo_frame.SEGMENT_BYTES) < lengths[:, np.newaxis]].tobytes()

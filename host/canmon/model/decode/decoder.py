@@ -198,17 +198,10 @@ class BusDecoder:
         alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
-    def heartbeat(self, can_id: int) -> Route | None:
-        """Return a decoder of heartbeats of a node without node guarding, or None.
-
-        The decoder is valid until a remote frame arrives. Pass a boot-up to `take`, because a
-        boot-up changes more.
-        """
-        route = self._routes.get(can_id) or self._route(can_id)
-        if not isinstance(route, partial) or route.func != self._error_control:
-            return None
-        node = int(route.args[0])
-        return None if node in self._guarded else partial(_unguarded, node)
+    @property
+    def version(self) -> int:
+        """A number that grows with each possible change of what frames and objects mean."""
+        return self.changes + self.renamed
 
     def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
         """Return the channel of a CAN-ID with SDO frames, and whether its client sends them.
@@ -222,10 +215,29 @@ class BusDecoder:
         return take.__self__, take.__name__ == "request"
 
     def error_control(self, can_id: int) -> int | None:
-        """Return the node whose boot-ups and heartbeats a CAN-ID carries; valid as `sdo` is."""
+        """Return the node whose heartbeats a CAN-ID carries, None if not any; valid as `sdo` is."""
         route = self._routes.get(can_id) or self._route(can_id)
-        told = isinstance(route, partial) and route.func == self._error_control
-        return int(route.args[0]) if told else None  # type: ignore[attr-defined] # of a partial
+        if not isinstance(route, partial) or route.func != self._error_control:
+            return None
+        return int(route.args[0])
+
+    def guarding(self, node: int) -> bool:
+        """Return whether the next frame of error control of a node answers a guarding request."""
+        return node in self._guarded
+
+    def answers_guarding(self, node: int) -> bool:
+        """Return whether a node answers guarding requests.
+
+        A node with a producer heartbeat time answers none (CiA 301, error control).
+        """
+        return not self.memory(node).number(*node_memory.HEARTBEAT_TIME)
+
+    def guard(self, node: int, *, asked: bool) -> None:
+        """Learn that the last frame of error control of a node was a guarding request, or not."""
+        if asked:
+            self._guarded.add(node)
+        else:
+            self._guarded.discard(node)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the running SDO transfers."""
@@ -271,16 +283,9 @@ class BusDecoder:
         return partial(self._sdo, node, take)
 
     def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
-        # A node with a producer heartbeat time answers no guarding (CiA 301, error
-        # control).
-        guarded = node in self._guarded and not self.memory(node).number(
-            *node_memory.HEARTBEAT_TIME
-        )
+        guarded = node in self._guarded and self.answers_guarding(node)
         decoded = services.decode_error_control(node, frame, guarded=guarded)
-        if frame.remote:
-            self._guarded.add(node)
-        else:
-            self._guarded.discard(node)
+        self.guard(node, asked=frame.remote)
         if decoded.kind == "boot-up" and self.memory(node).boot():
             self.renamed += 1
             indices = self.memory(node).indices
@@ -414,10 +419,6 @@ def _lss_route() -> Route:
     from tickrig.host.canmon.model.decode.services import decode_lss  # noqa: PLC0415 - on few buses
 
     return decode_lss
-
-
-def _unguarded(node: int, at_us: int, frame: CanFrame) -> Decoded:
-    return services.decode_error_control(node, frame, guarded=False)
 
 
 def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:

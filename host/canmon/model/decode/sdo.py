@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final, NamedTuple
@@ -60,6 +59,9 @@ class _TransferPhase(Enum):
     BLOCK_ENDED = auto()  # end was said, the answer is expected
 
 
+_SEQNOS: Final = bytes(range(1, sdo_frame.MAX_BLOCK_SIZE + 1))
+
+
 @dataclass(slots=True)
 class _OpenTransfer:
     """The known part of a transfer.
@@ -110,6 +112,7 @@ class _OpenTransfer:
     block_size: int = 0
     done: bool = False
     new_flaw: str = ""
+    _run: bytes = b""  # segments 1, 2, .. of a block, 7 bytes each, that came as the first
     _block: dict[int, bytes] = field(default_factory=dict)
 
     @property
@@ -124,24 +127,49 @@ class _OpenTransfer:
 
     @property
     def is_block_over(self) -> bool:
-        """Whether all segments of a block have been received."""
+        """Whether all segments of a block have come."""
+        self._take_run()
         heard = max(self._block, default=0)
         return heard in (self.block_last, self.block_size) and heard > 0
 
     def take_block_segment(self, segment: sdo_frame.BlockSegment) -> None:
-        """Keep a segment until its acknowledgement confirms it."""
+        """Keep a segment until its receipt says that it counts."""
+        self._take_run()
         self._block[segment.seqno] = segment.data
         if segment.last:
             self.block_last = segment.seqno
 
-    def keep_segments(self, segments: Iterable[tuple[int, bytes]], last: int | None) -> None:
+    def take_block_segments(self, numbers: bytes, data: bytes, last: int | None) -> None:
         """Keep many segments, as `take_block_segment` does one."""
-        self._block.update(segments)
+        self._take_run()
+        if not self._block and _SEQNOS.startswith(numbers):
+            self._run = data
+        else:
+            self._keep(numbers, data)
         if last is not None:
             self.block_last = last
 
+    def _keep(self, numbers: bytes, data: bytes) -> None:
+        parts = range(0, len(data), sdo_frame.SEGMENT_BYTES)
+        segments = (data[at : at + sdo_frame.SEGMENT_BYTES] for at in parts)
+        self._block.update(zip(numbers, segments, strict=True))
+
+    def _take_run(self) -> None:
+        """Keep the segments of the run one by one."""
+        if self._run:
+            run, self._run = self._run, b""
+            self._keep(_SEQNOS[: len(run) // sdo_frame.SEGMENT_BYTES], run)
+
     def acknowledge_block(self, ackseq: int) -> None:
-        """Accept the segments that arrived in sequence. The other segments are sent again."""
+        """Take the segments that came in sequence; the others are sent again."""
+        if self._run and len(self._run) == ackseq * sdo_frame.SEGMENT_BYTES:
+            self._run, run = b"", self._run
+            self.data += run
+            if self.block_last == ackseq:
+                self.phase = _TransferPhase.BLOCK_ENDING
+            self.block_last = None
+            return
+        self._take_run()
         if any(seqno not in self._block for seqno in range(1, ackseq + 1)):
             self.add_flaw("segments missing")
         self.data += b"".join(self._block.get(seqno, b"") for seqno in range(1, ackseq + 1))
@@ -477,11 +505,17 @@ class SdoChannel:
             return None
         return running.direction if running.block_last is None else None
 
-    def take_block(self, segments: Iterable[tuple[int, bytes]], last: int | None) -> None:
-        """Take segments of a block, by number; `last` is the number of the last of the transfer."""
+    def take_block(self, numbers: bytes, data: bytes, last: int | None) -> None:
+        """Take segments of a block that come.
+
+        Args:
+            numbers: the number of each.
+            data: 7 bytes of each.
+            last: number of the last of the transfer; None if it is not among them.
+        """
         running = self._running
         assert running is not None, "a transfer runs"
-        running.keep_segments(segments, last)
+        running.take_block_segments(numbers, data, last)
 
     def request(self, at_us: int, data: bytes) -> SdoStep:
         """Process a frame of the client."""
