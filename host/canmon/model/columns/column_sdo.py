@@ -257,6 +257,7 @@ class ColumnSdo:
 
     def __init__(self, bus: BusDecoder) -> None:
         self._bus, self._known = bus, 0
+        self._heads = cells.TextTable(7, lambda node: f"{node} sdo ")
         self._texts: dict[Any, str] = {}
         self._writers: dict[tuple[int, int, int], _ValueText] = {}
 
@@ -301,7 +302,7 @@ class ColumnSdo:
         for channel, begin, end in zip(channels, cuts, cuts[1:], strict=False):
             talk.follow(channel, begin, end)
         if talk.blocks:
-            _write_block_segments(heard, talk.blocks, texts)
+            self._write_blocks(heard, talk.blocks, texts)
         if talk.parts:
             self._write(heard, talk.parts, texts)
 
@@ -401,21 +402,20 @@ class ColumnSdo:
         sums = np.cumsum(lengths)
         offsets = before[starts] - sums[starts] + lengths[starts]
         steps = np.flatnonzero(segment)
-        total, sent = sizes[starts][number[steps]], lengths[steps]
+        sent = lengths[steps]
+        ofs = cells.of_few(sizes[starts], lambda size: f" of {size} B" if size else " B")
         have = sums[steps] + offsets[number[steps]]
         for uploads in (True, False):
             chosen = np.flatnonzero(upload[steps] == uploads)
             if not len(chosen):
                 continue
             at = rows[steps[chosen]]
-            of = cells.of_few(total[chosen], lambda size: f" of {size} B" if size else " B")
-            head = cells.of_few(heard.node[at], lambda node: f"{node} sdo ")
+            of, head = ofs[number[steps[chosen]]], self._heads.cells(heard.node[at])
             so_far = [*cells.whole(have[chosen] - sent[chosen]), of, b" so far"]
             if uploads:
                 asked: list[cells.Part] = [head, b"asks for a segment, ", *so_far]
             else:
-                length = cells.of_few(sent[chosen], str)
-                asked = [head, b"segment of ", length, b" B, ", *so_far]
+                asked = [head, b"segment of ", *cells.whole(sent[chosen]), b" B, ", *so_far]
             texts.put(heard.place[at], cells.together(len(at), asked))
             open_yet = np.flatnonzero(heard.after[at] != 0)
             if len(open_yet):
@@ -431,6 +431,16 @@ class ColumnSdo:
             lasted_us = int(heard.at_us[row + 1] - heard.at_us[opened])
             said = self._transferred(heard, opened, row, data)
             texts.put_one(int(heard.place[row + 1]), f"{said}{lasted_us / 1_000:.1f} ms)")
+
+    def _write_blocks(
+        self, heard: _Frames, blocks: Sequence[tuple[int, int]], texts: cells.Texts
+    ) -> None:
+        """Write segments of blocks, which are those of these rows."""
+        rows = np.concatenate([np.arange(*one) for one in blocks])
+        numbers = (heard.word[rows] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.int64)
+        heads = self._heads.cells(heard.node[rows])
+        parts = [heads, b"segment ", *cells.whole(numbers), b" of a block"]
+        texts.put(heard.place[rows], cells.together(len(rows), parts))
 
     def _write_opened(self, heard: _Frames, rows: Ints, texts: cells.Texts) -> None:
         """Write the answers after which segments follow."""
@@ -574,16 +584,6 @@ def _joined(words: _Words, lengths: Ints) -> bytes:
     if (lengths == sdo_frame.SEGMENT_BYTES).all():
         return octets.tobytes()
     return octets[np.arange(sdo_frame.SEGMENT_BYTES) < lengths[:, np.newaxis]].tobytes()
-
-
-def _write_block_segments(
-    heard: _Frames, blocks: Sequence[tuple[int, int]], texts: cells.Texts
-) -> None:
-    rows = np.concatenate([np.arange(*one) for one in blocks])
-    numbers = (heard.word[rows] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.int64)
-    nodes = cells.of_few(heard.node[rows], lambda node: f"{node} sdo segment ")
-    parts = [nodes, *cells.whole(numbers), b" of a block"]
-    texts.put(heard.place[rows], cells.together(len(rows), parts))
 
 
 def _text(decoded: Decoded) -> str:
