@@ -28,7 +28,9 @@ from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_
 _PAIRS: Final = cells.table([f"{byte:02X}" for byte in range(256)], "<u2")
 _THREE: Final = cells.table([f"{number:03d}" for number in range(1_000)], "<u4")
 _STANDARD: Final = cells.table([f"{can_id:03X}" for can_id in range(STANDARD_MAX + 1)], "<u4")
-_BLANKS: Final = np.array([b" " * count for count in range(frames.DATA_WIDTH + 3)])
+_GAP: Final = 3
+"""Blanks before a meaning, behind the width of the data."""
+_REMOTE: Final = b" remote request"
 
 
 _SLAB: Final = 1 << 12
@@ -61,12 +63,17 @@ def _channels(columns: Columns) -> cells.Part:
     return cells.of_texts(columns.channels)[columns.channel]
 
 
-def _octets(columns: Columns, remote: cells.Mask, blank: bytes = b"") -> cells.Cells:
-    """Write the bytes of the data, each behind a blank or none."""
+def _octets(
+    columns: Columns, remote: cells.Mask, blank: bytes = b"", filled: cells.Mask | None = None
+) -> cells.Cells:
+    """Write the bytes of the data, each behind a blank or none, to the full width if `filled`."""
     table, there = _couples(blank)
     couples = columns.payload.astype("<u8").view("<u2").reshape(-1, MAX_DATA_BYTES // 2)
-    rows = table[couples]
-    rows &= there[np.where(remote, 0, columns.dlc)]
+    rows, lengths = table[couples], np.where(remote, 0, columns.dlc)
+    rows &= there[lengths]
+    if filled is not None and (lengths != MAX_DATA_BYTES).any():
+        blanks = (there ^ there[-1]) & int.from_bytes(b" " * rows.itemsize, "little")
+        rows |= blanks[np.where(filled, lengths, MAX_DATA_BYTES)]
     return cells.of(rows)
 
 
@@ -153,17 +160,23 @@ class ScreenText:
             parts += [b"  ", cells.where(columns.sent, b"TX - -", b"RX - -")]
         parts += [b"  ", *self._indents(long), idents, b"  "]
         length = cells.of(_THREE[columns.dlc])[:, 2:3]
-        data: list[cells.Part] = [b" [", length, b"] ", _octets(columns, remote, b" ")]
         errors = ident & np.uint32(frames.ERROR) != 0
+        meant = None if meanings is None else meanings.cells[rows, 0] != 0
+        filled = None if meant is None else meant & ~remote
+        data: list[cells.Part] = [b" [", length, b"] ", _octets(columns, remote, b" ", filled)]
         if remote.any():
-            data.append(cells.where(remote, b" remote request"))
+            data.append(cells.where(remote, _REMOTE))
         if errors.any():
             data.append(cells.where(errors, b"   ERRORFRAME"))
-        if meanings is None:
+        if meanings is None or meant is None:
             return cells.joined(len(columns), [*parts, *data, b"\n"])
-        blanks = frames.DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
-        blanks = np.where(meanings.cells[rows, 0] != 0, 3 + np.where(errors, 0, blanks), 0)
-        return meanings.lines(rows, [*parts, *data, cells.of(_BLANKS[blanks])])
+        gap = frames.DATA_WIDTH + 1 + _GAP - len(b" [8] ")
+        far, near = b" " * (gap - len(_REMOTE)), b" " * (gap - 3 * MAX_DATA_BYTES)
+        for which, blanks in ((remote, far), (errors, b" " * _GAP), (~remote & ~errors, near)):
+            chosen = which & meant
+            if chosen.any():
+                data.append(blanks if chosen.all() else cells.where(chosen, blanks))
+        return meanings.lines(rows, [*parts, *data])
 
     def _indents(self, long: cells.Mask) -> list[cells.Part]:
         """Return the blanks before identifiers of three digits, once one of eight has occurred."""
