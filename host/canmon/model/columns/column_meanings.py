@@ -23,7 +23,7 @@ from tickrig.host.canmon.model.decode.decoder import (
     Decoder,
     Effect,
     Route,
-    decodes_all_alike,
+    data_that_counts,
 )
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
@@ -57,8 +57,8 @@ The arguments of the function are texts, rows, payloads and lengths.
 """
 
 _FEW: Final = 16
-"""Number of frames up to which decoding them one by one is faster."""
-_SETTLED: Final = 256
+"""Frames that are decoded one by one sooner than at once."""
+_SETTLED: Final = 128
 """Fewer frames are decoded one by one, and so many where what a CAN-ID means has changed."""
 _MOST_LAYOUTS: Final = 1 << 10
 """Number of PDOs whose format strings are kept."""
@@ -249,10 +249,10 @@ def _take_alike(
     """Write frames of which those with the same data have one text."""
     rows = np.concatenate([one.rows for one in groups])
     kinds = np.repeat(np.arange(len(groups)), [len(one.rows) for one in groups]) << 5
-    plain = np.array([not decodes_all_alike(one.route) for one in groups])[kinds >> 5]
+    masks = np.array([data_that_counts(one.route) for one in groups], np.uint64)[kinds >> 5]
     remote = frames.ident[rows] & np.uint32(REMOTE) != 0
-    kinds |= remote.astype(np.int64) << 4 | np.where(plain, frames.dlc[rows], 0)
-    payload = np.where(plain, frames.payload[rows], np.uint64(0))
+    kinds |= remote.astype(np.int64) << 4 | np.where(masks != 0, frames.dlc[rows], 0)
+    payload = frames.payload[rows] & masks
     short, long = payload < 1 << 8, payload >= _LONG
     for chosen in map(np.flatnonzero, (short, ~short & ~long, long)):
         if not len(chosen):

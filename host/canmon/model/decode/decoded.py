@@ -98,6 +98,17 @@ class Transfer:
         """Index and sub-index, or None if they are unknown."""
         return None if self.index is None or self.sub is None else (self.index, self.sub)
 
+    def described(  # noqa: PLR0913, PLR0917 - all that is known
+        self, name: str, value: Value | None, text: str, length: str, unit: str, source: str
+    ) -> Transfer:
+        """Return the same with what is known of its object; `replace` would be slow."""
+        return Transfer(
+            *(self.at_us, self.duration_us, self.node, self.direction, self.mode),
+            *(self.index, self.sub, self.outcome, self.data, self.abort_code, self.by_client),
+            *(self.retries, self.partial, self.flaws, self.sized),
+            *(length, name, value, text, unit, source),
+        )
+
     def __str__(self) -> str:
         """Return the transfer as one line."""
         parts = [f"{self.direction} {write_entry(self.entry)}"]

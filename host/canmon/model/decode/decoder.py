@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from enum import IntEnum
 from functools import partial
 from pathlib import Path
@@ -312,13 +311,13 @@ class BusDecoder:
 
     def named(self, transfer: Transfer) -> Transfer:
         """Return a transfer with name and value of its object."""
-        entry = transfer.entry
+        entry, data, sized = transfer.entry, transfer.data, transfer.sized
         text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
-        data, sized = transfer.data, transfer.sized
-        value, written = (None, "") if data is None else text.read(data, sized=sized)
-        named = replace(transfer, name=text.name, value=value, text=written)
-        length = "" if data is None else _odd_length(text.kind, data, sized=sized)
-        return replace(named, length=length, unit=text.unit, source=text.source)
+        if data is None:
+            return transfer.described(text.name, None, "", "", text.unit, text.source)
+        value, written = text.read(data, sized=sized)
+        length = _odd_length(text.kind, data, sized=sized)
+        return transfer.described(text.name, value, written, length, text.unit, text.source)
 
     def _learn(self, transfer: Transfer) -> None:
         """Learn from a transferred value."""
@@ -433,9 +432,15 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
     return Decoded("raw")
 
 
-def decodes_all_alike(route: Route) -> bool:
-    """Return whether a route decodes all data in the same way."""
-    return (route.func if isinstance(route, partial) else route) in (_unmapped, _raw)
+def data_that_counts(route: Route) -> int:
+    """Return a mask of the data, a little-endian number, on which the text of a frame depends.
+
+    If it is 0, the length does not count either.
+    """
+    told = route.func if isinstance(route, partial) else route
+    if told in (_unmapped, _raw):
+        return 0
+    return 0xFF if told is services.decode_sync else (1 << 64) - 1
 
 
 FD: Final = Decoded("fd", None, "no CANopen service")
