@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.column_log import blocks
+from tests.host.canmon.model.columns.test_column_text import MARKS, said
+from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tests.host.canmon.model.decode.test_noise import SDO
 from tickrig.host.canmon.model.columns import column_meanings, column_sdo
 from tickrig.host.canmon.model.columns.column_meanings import ColumnMeanings
@@ -16,6 +20,7 @@ from tickrig.host.canmon.model.decode.decoded import EDS
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, ObjectText
 from tickrig.host.canmon.model.frames import Record, decoded_text
+from tickrig.host.canmon.model.logs.log_writer import log_line
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
@@ -182,6 +187,32 @@ def traffic(draw: st.DrawFn) -> list[Record]:
 def test_dialogues_mean_the_same_in_columns(records: list[Record], size: int, named: bool) -> None:
     eds = {5: EdsObjects(TEXTS), 6: EdsObjects(TEXTS)} if named else {}
     assert_alike(records, size, eds)
+
+
+WORDS = (
+    *((), ("-x", "-t", "d"), ("--to", "0.01"), ("--from", "0.005"), ("-F", "sdo")),
+    *(("-F", "node=5 and not heartbeat"), ("--jsonl",)),
+)
+
+
+@given(words=st.sampled_from(WORDS), records=traffic(), data=st.data())
+def test_a_log_is_shown_alike(
+    words: tuple[str, ...], records: list[Record], data: st.DataObject
+) -> None:
+    lines = [log_line(record) for record in records]
+    for mark in data.draw(st.lists(MARKS, max_size=3)):
+        lines.insert(data.draw(st.integers(0, len(lines))), mark)
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "run.log")
+        path.write_text("\n".join(lines), "ascii")
+        assert said(0, "dump", path, *words) == said(1 << 30, "dump", path, *words)
+
+
+@pytest.mark.parametrize("dbc", [(), ("--dbc", str(GOLDEN / "engine.dbc"))])
+@pytest.mark.parametrize("name", ["drive.log", "noise.log"])
+def test_sample_logs_are_shown_alike(name: str, dbc: tuple[str, ...]) -> None:
+    path = GOLDEN / name
+    assert said(0, "dump", path, *dbc) == said(1 << 30, "dump", path, *dbc)
 
 
 def at_each_ms(frames: Sequence[CanFrame]) -> list[Record]:
