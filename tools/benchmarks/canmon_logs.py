@@ -9,7 +9,8 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import count, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +20,7 @@ from benchmarks.table import RUNS, row
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
+from tickrig.wire.canopen.sdo_frame import crc16
 
 FRAMES = 1_000_000
 PEER_FRAMES = 100_000
@@ -91,7 +93,110 @@ def whole_programs(log: Path) -> None:
     pair("conv to ASC", ("conv", log, folder / "ours.asc"),
          ("log2asc", "can0", "-I", log, "-O", folder / "theirs.asc"))  # fmt: skip
     pair("dump --dbc", ("dump", log, "--dbc", dbc), ("cantools", "decode", dbc), log)
-    pair("dump", ("dump", log), ("tshark", "-r", log, "-d", "can.subdissector,canopen"))
+    pair("dump", ("dump", log), ("tshark", "-r", log, *DISSECTOR))
+    for what, frames in TRAFFIC.items():
+        part = folder / "part.log"
+        write_frames(part, islice(frames(), FRAMES))
+        pair(f"dump, {what}", ("dump", part), ("tshark", "-r", part, *DISSECTOR))
+
+
+DISSECTOR = ("-d", "can.subdissector,canopen")
+MAPPING = (
+    *("605#2F001A0000000000", "585#60001A0000000000"),
+    *("605#23001A0110004160", "585#60001A0100000000"),
+    *("605#23001A0220006460", "585#60001A0200000000"),
+    *("605#2F001A0002000000", "585#60001A0000000000"),
+)
+"""The TPDO of node 5 has a statusword and a position."""
+POLLED = ("4160", "6460", "6C60", "7760", "0020", "6160")
+WORDS = POLLED[0], POLLED[3]
+EMCIES = ("3081110700000000", "0000000000000000", "10231100000000FF")
+DOMAIN = 14_000
+
+
+def tpdos() -> Iterator[str]:
+    """Yield TPDOs of a configured node."""
+    yield from MAPPING
+    yield from (f"185#3702{n.to_bytes(4, 'little').hex().upper()}" for n in count())
+
+
+def polled(polls: int = 1, every: int = 8) -> Iterator[str]:
+    """Yield TPDOs, and expedited uploads of objects of four nodes, values by chance."""
+    chance, rest = random.Random(1), tpdos()
+    yield from islice(rest, len(MAPPING))
+    for number in count():
+        yield from islice(rest, every)
+        for _ in range(polls):
+            node, index = 5 + number % 4, POLLED[number % len(POLLED)]
+            yield f"{0x600 + node:03X}#40{index}0000000000"
+            size = 2 if index in WORDS else 4
+            value = chance.randbytes(size).ljust(4, b"\0").hex().upper()
+            yield f"{0x580 + node:03X}#{0x43 | 4 - size << 2:02X}{index}00{value}"
+
+
+def downloads() -> Iterator[str]:
+    """Yield segmented and block downloads, long and short ones."""
+    chance = random.Random(1)
+    while True:
+        yield from segmented(5, chance.randbytes(DOMAIN // 2))
+        yield from block(6, chance.randbytes(DOMAIN))
+        for number in range(20):
+            yield from segmented(7, b"hello %d" % (number % 5))
+
+
+def segmented(node: int, data: bytes) -> Iterator[str]:
+    """Yield the frames of a segmented download."""
+    asks, answers = f"{0x600 + node:03X}#", f"{0x580 + node:03X}#"
+    yield f"{asks}21501F01{len(data).to_bytes(4, 'little').hex().upper()}"
+    yield f"{answers}60501F0100000000"
+    for at in range(0, len(data), 7):
+        part, toggle = data[at : at + 7], at // 7 % 2 << 4
+        head = toggle | 7 - len(part) << 1 | (at + 7 >= len(data))
+        yield f"{asks}{head:02X}{part.ljust(7, bytes(1)).hex().upper()}"
+        yield f"{answers}{0x20 | toggle:02X}00000000000000"
+
+
+def block(node: int, data: bytes) -> Iterator[str]:
+    """Yield the frames of a block download, of whole segments."""
+    asks, answers = f"{0x600 + node:03X}#", f"{0x580 + node:03X}#"
+    yield f"{asks}C6501F01{len(data).to_bytes(4, 'little').hex().upper()}"
+    yield f"{answers}A4501F017F000000"
+    parts = [data[at : at + 7] for at in range(0, len(data), 7)]
+    for begin in range(0, len(parts), 127):
+        for number, part in enumerate(parts[begin : begin + 127], 1):
+            yield f"{asks}{number | (begin + number == len(parts)) << 7:02X}{part.hex().upper()}"
+        yield f"{answers}A2{number:02X}7F0000000000"
+    yield f"{asks}C1{crc16(data).to_bytes(2, 'little').hex().upper()}0000000000"
+    yield f"{answers}A100000000000000"
+
+
+def beats() -> Iterator[str]:
+    """Yield heartbeats of 39 nodes, EMCY of a third of them, NMT and SYNC."""
+    chance = random.Random(1)
+    while True:
+        for node in range(1, 40):
+            yield f"{0x700 + node:03X}#05"
+            if chance.random() < 0.3:
+                yield f"{0x80 + node:03X}#{chance.choice(EMCIES)}"
+        yield from ("000#0100", "080#")
+
+
+TRAFFIC: dict[str, Callable[[], Iterator[str]]] = {
+    "TPDOs": tpdos,
+    "a fifth SDO uploads": polled,
+    "SDO uploads alone": lambda: polled(every=0),
+    "SDO downloads": downloads,
+    "heartbeats and EMCY": beats,
+}
+
+
+def write_frames(path: Path, frames: Iterable[str]) -> None:
+    """Write a log of these frames."""
+    chance, at_us = random.Random(1), START_US
+    with path.open("w", encoding="ascii") as file:
+        for frame in frames:
+            at_us += chance.randrange(100, 300)
+            file.write(f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d}) can0 {frame}\n")
 
 
 def pair(

@@ -302,8 +302,7 @@ class _Lessons:
             if speaker := bus.sdo(number):
                 channel, asks = self._speakers[number], _ = speaker
                 if not asks:
-                    unknown = not bus.memory(channel.node).has_statusword
-                    answers.append(teachers(frames, rows, statusword=unknown))
+                    answers.append(teachers(frames, rows, bus.memory(channel.node)))
             elif (node := bus.error_control(number)) is not None:
                 boot = (frames.payload[rows] == 0) & (frames.dlc[rows] == 1)
                 boot &= frames.ident[rows] & np.uint32(REMOTE) == 0
@@ -331,7 +330,7 @@ class _Lessons:
 
     def _learns(self, channel: SdoChannel) -> bool:
         entry, memory = channel.runs(), self._bus.memory(channel.node)
-        return entry is not None and teaches(entry, statusword=not memory.has_statusword)
+        return entry is not None and teaches(entry, memory)
 
 
 def _alike(numbers: Ints) -> list[Ints]:

@@ -13,7 +13,7 @@ from tickrig.host.canmon.model.columns import cells
 from tickrig.host.canmon.model.columns.columns import Columns, Ints
 from tickrig.host.canmon.model.decode.decoded import Decoded, TransferDirection
 from tickrig.host.canmon.model.decode.decoder import TEACHING
-from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, ObjectText
+from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, NodeMemory, ObjectText
 from tickrig.host.canmon.model.decode.sdo import SdoChannel
 from tickrig.host.canmon.model.frames import REMOTE, decoded_text
 from tickrig.host.text.page_text import one_line
@@ -122,27 +122,36 @@ _TEACHING_ANSWERS: Final = (
 )
 
 
-def teachers(frames: Columns, rows: Ints, *, statusword: bool) -> Ints:
+_EXPEDITED_ANSWER: Final = ServerCommand.UPLOAD | sdo_frame.EXPEDITED
+_SIZE_BITS: Final = 0x0C | sdo_frame.SIZE_INDICATED
+_TWO_BYTES: Final = 2 << 2 | sdo_frame.SIZE_INDICATED
+
+
+def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
     """Return the rows of answers with which a transfer may end, or begin, that teaches something.
 
     Args:
         frames: frames of one bus.
         rows: the rows of the answers of a server.
-        statusword: whether 6041h teaches something.
+        memory: what is known of its node.
     """
     words = frames.payload[rows]
     index = (words >> np.uint64(8) & np.uint64(0xFFFF)).astype(np.int64)
     found = _teaching()[index]
-    if statusword:
-        found |= index == STATUSWORD[0]
+    if not memory.has_statusword:
+        state = index == STATUSWORD[0]
+        if memory.describe(*STATUSWORD).kind is None:  # then only two bytes are a statusword
+            fast = words & np.uint64(sdo_frame.SPECIFIER | sdo_frame.EXPEDITED) == _EXPEDITED_ANSWER
+            state &= ~fast | (words & np.uint64(_SIZE_BITS) == _TWO_BYTES)
+        found |= state
     found &= np.isin(words & np.uint64(sdo_frame.SPECIFIER), _TEACHING_ANSWERS)
     found &= (frames.dlc[rows] == _WHOLE) & (frames.ident[rows] & np.uint32(REMOTE) == 0)
     return rows[found]
 
 
-def teaches(entry: tuple[int, int], *, statusword: bool) -> bool:
+def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
     """Return whether a value of an object may teach something; see `teachers`."""
-    return entry[0] in TEACHING or (statusword and entry == STATUSWORD)
+    return entry[0] in TEACHING or (entry == STATUSWORD and not memory.has_statusword)
 
 
 def _next_by_two(marks: npt.NDArray[np.bool_]) -> Ints:
