@@ -158,14 +158,12 @@ class BusDecoder:
 
     def take(self, at_us: int, frame: CanFrame) -> Decoded:
         """Decode a frame with an 11-bit identifier."""
-        route = self._routes.get(frame.can_id)
-        if route is None:
-            route = self._routes[frame.can_id] = self._route(frame.can_id)
+        route = self._routes.get(frame.can_id) or self._routed(frame.can_id)
         return route(at_us, frame)
 
     def effect(self, can_id: int) -> Effect:
         """Return which frames with a CAN-ID can change the knowledge about nodes."""
-        route = self._routes.get(can_id) or self._route(can_id)
+        route = self._routed(can_id)
         if isinstance(route, partial):
             if route.func is _unmapped:
                 return Effect.NONE if sender_of(can_id) is None else Effect.LATEST
@@ -184,7 +182,7 @@ class BusDecoder:
         The decoder is valid until `changes` grows. For error control, SDO and multiplexed PDOs,
         earlier frames count.
         """
-        route = self._routes.get(can_id) or self._route(can_id)
+        route = self._routed(can_id)
         told = route.func if isinstance(route, partial) else route
         by_frame = told in (
             _unmapped,
@@ -207,7 +205,7 @@ class BusDecoder:
 
         It is valid until `changes` grows.
         """
-        route = self._routes.get(can_id) or self._route(can_id)
+        route = self._routed(can_id)
         if not isinstance(route, partial) or route.func != self._sdo:
             return None
         take = route.args[1]
@@ -215,7 +213,7 @@ class BusDecoder:
 
     def error_control(self, can_id: int) -> int | None:
         """Return the node whose heartbeats a CAN-ID carries, None if not any; valid as `sdo` is."""
-        route = self._routes.get(can_id) or self._route(can_id)
+        route = self._routed(can_id)
         if not isinstance(route, partial) or route.func != self._error_control:
             return None
         return int(route.args[0])
@@ -249,6 +247,12 @@ class BusDecoder:
         if memory is None:
             memory = self._memories[node] = node_memory.NodeMemory(self._eds.get(node))
         return memory
+
+    def _routed(self, can_id: int) -> Route:
+        route = self._routes.get(can_id)
+        if route is None:
+            route = self._routes[can_id] = self._route(can_id)
+        return route
 
     def _route(self, can_id: int) -> Route:
         told = self._configured.get(can_id) or _PRE_DEFINED.get(can_id)
