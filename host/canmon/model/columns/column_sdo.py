@@ -169,7 +169,6 @@ class _Frames(NamedTuple):
 
     Attributes:
         at_us: times.
-        can_id: CAN-IDs.
         word: data, as a number.
         node: the server.
         asks: whether the client sent it.
@@ -183,7 +182,6 @@ class _Frames(NamedTuple):
     """
 
     at_us: Ints
-    can_id: Ints
     word: _Words
     node: Ints
     asks: npt.NDArray[np.bool_]
@@ -227,10 +225,13 @@ class _Frames(NamedTuple):
         run = np.where(cuts, np.arange(1, len(rows) + 1), len(rows))
         run = np.where(numbered, np.minimum.accumulate(run[::-1])[::-1], 0)
         return cls(
-            *(frames.at_us[rows], (frames.ident[rows] & np.uint32(EXTENDED_MAX)).astype(np.int64)),
-            *(word, side.node[rows], asks, places[rows], kind, before, after),
+            *(frames.at_us[rows], word, side.node[rows], asks, places[rows], kind, before, after),
             *(_next_by_two(ends), _next_by_two((kind != 0) & (after == 0)), run),
         )
+
+    def data(self, row: int) -> bytes:
+        """Return the data of a frame."""
+        return int(self.word[row]).to_bytes(_WHOLE, "little")
 
 
 class _Sides(NamedTuple):
@@ -467,10 +468,7 @@ class ColumnSdo:
     def _transferred(self, heard: _Frames, opened: int, last: int, data: bytes) -> str:
         """Return the text of a segmented transfer, without its duration."""
         node = int(heard.node[opened])
-        pairs = [
-            [int(heard.word[row + n]).to_bytes(_WHOLE, "little") for n in (0, 1)]
-            for row in (opened, last)
-        ]
+        pairs = [[heard.data(row + n) for n in (0, 1)] for row in (opened, last)]
         key = node, data, *pairs[0]
         if key in self._texts:
             return self._texts[key]
@@ -513,19 +511,21 @@ class _Talk:
             ):
                 row = self._block(channel, row)
             else:
-                self._one(row)
+                self._one(channel, row)
                 row += 1
 
-    def _one(self, row: int) -> None:
+    def _one(self, channel: SdoChannel, row: int) -> None:
         heard = self._heard
-        data = int(heard.word[row]).to_bytes(_WHOLE, "little")
-        decoded = self._bus.take(int(heard.at_us[row]), CanFrame(int(heard.can_id[row]), data))
-        self._texts.put_one(int(heard.place[row]), _text(decoded))
+        take = channel.request if heard.asks[row] else channel.response
+        step = take(int(heard.at_us[row]), heard.data(row))
+        node = channel.node
+        text = _text(self._bus.sdo_step(node, step)) if step.ended else f"{node} sdo {step.text}"
+        self._texts.put_one(int(heard.place[row]), text)
 
-    def _pair(self, row: int) -> int:
+    def _pair(self, channel: SdoChannel, row: int) -> int:
         """Take a pair frame by frame; return the row behind it."""
-        self._one(row)
-        self._one(row + 1)
+        self._one(channel, row)
+        self._one(channel, row + 1)
         return row + 2
 
     def _chain(self, channel: SdoChannel, row: int) -> int:
@@ -538,7 +538,7 @@ class _Talk:
             if last >= row:
                 self.parts.append(_Part(row, last, received, size))
                 self._segments(channel, row, last)
-            return self._pair(done) if done == last + 2 else last + 2
+            return self._pair(channel, done) if done == last + 2 else last + 2
         self.parts.append(_Part(row, last))
         if heard.after[last] == 0:
             channel.end_exchanges()
@@ -549,9 +549,8 @@ class _Talk:
         if opened > row:
             channel.end_exchanges()
         for place in (opened, opened + 1):
-            data = int(heard.word[place]).to_bytes(_WHOLE, "little")
             take = channel.request if heard.asks[place] else channel.response
-            take(int(heard.at_us[place]), data)
+            take(int(heard.at_us[place]), heard.data(place))
         if last > opened:
             self._segments(channel, opened + 2, last)
         return last + 2
@@ -568,7 +567,7 @@ class _Talk:
         """Take segments of a block; return the row behind them."""
         heard, end = self._heard, int(self._heard.run[row])
         if end <= row:  # an abort, as no segment has number 0
-            self._one(row)
+            self._one(channel, row)
             return row + 1
         commands, last = heard.word[row:end] & np.uint64(0xFF), None
         lasts = np.flatnonzero(commands & np.uint64(sdo_frame.BLOCK_LAST))

@@ -300,7 +300,10 @@ class BusDecoder:
     ) -> Decoded:
         if frame.remote:
             return Decoded("sdo", node, "remote frame")
-        step = take(at_us, frame.data)
+        return self.sdo_step(node, take(at_us, frame.data))
+
+    def sdo_step(self, node: int, step: SdoStep) -> Decoded:
+        """Return what an SDO frame of a node does, and learn from it."""
         if not step.ended:
             return Decoded(
                 *("sdo", node, step.text, (), "", step.entry), asks=step.asks, flaw=step.flaw
