@@ -59,7 +59,7 @@ The arguments of the function are texts, rows, payloads and lengths.
 _FEW: Final = 16
 """Frames that are decoded one by one sooner than at once."""
 _SETTLED: Final = 128
-"""Fewer frames are decoded one by one, and so many where what a CAN-ID means has changed."""
+"""Frames that are decoded one by one before the next try: there are fewer, or a meaning changed."""
 _MOST_LAYOUTS: Final = 1 << 10
 """Number of PDOs whose format strings are kept."""
 
@@ -220,22 +220,24 @@ def _error_control(
     """Return the frames of error control of a node; boot-ups go to `each`."""
     remote = frames.ident[rows] & np.uint32(REMOTE) != 0
     boots = (frames.payload[rows] == 0) & (frames.dlc[rows] == 1) & ~remote
-    asked = bool(remote[-1])
+    requested = bool(remote[-1])
     if not bus.guarding(node) and not remote.any():
         each.append(rows[boots])
-        return [_Alike(rows[~boots], partial(_beat, node, False))]
+        return [_Alike(rows[~boots], partial(_error_control_state, node, False))]
     guarded = np.empty(len(rows), np.bool_)
     guarded[0], guarded[1:] = bus.guarding(node), remote[:-1]
     guarded &= bus.answers_guarding(node)
     if (boots & ~guarded).any():
         each.append(rows)
         return []
-    bus.guard(node, asked=asked)
-    both = ((rows[guarded == one], partial(_beat, node, one)) for one in (False, True))
+    bus.guard(node, requested=requested)
+    both = (
+        (rows[guarded == one], partial(_error_control_state, node, one)) for one in (False, True)
+    )
     return [_Alike(*one) for one in both]
 
 
-def _beat(node: int, guarded: bool, at_us: int, frame: CanFrame) -> Decoded:
+def _error_control_state(node: int, guarded: bool, at_us: int, frame: CanFrame) -> Decoded:
     return decode_error_control(node, frame, guarded=guarded)
 
 

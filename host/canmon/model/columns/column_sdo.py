@@ -306,15 +306,15 @@ class ColumnSdo:
             rows = rows[~odd]
         if not len(rows):
             return
-        heard = _Frames.of(frames, rows, places, side)
+        dialogue = _Frames.of(frames, rows, places, side)
         cuts = np.searchsorted(np.sort(side.channel[rows]), np.arange(len(channels) + 1)).tolist()
-        talk = _Talk(self._bus, heard, texts)
+        talk = _Talk(self._bus, dialogue, texts)
         for channel, begin, end in zip(channels, cuts, cuts[1:], strict=False):
             talk.follow(channel, begin, end)
         if talk.blocks:
-            self._write_blocks(heard, talk.blocks, texts)
+            self._write_blocks(dialogue, talk.blocks, texts)
         if talk.parts:
-            self._write(heard, talk.parts, texts)
+            self._write(dialogue, talk.parts, texts)
 
     def _odd(self, frames: Columns, rows: Ints, places: Ints, texts: cells.Texts) -> None:
         """Take frames that are no SDO frames by their form; they change nothing."""
@@ -329,47 +329,47 @@ class ColumnSdo:
             said.append(_text(self._bus.take(0, frame)))
         texts.put(places[rows], cells.of_texts(said)[which])
 
-    def _write(self, heard: _Frames, parts: Sequence[_Part], texts: cells.Texts) -> None:
+    def _write(self, dialogue: _Frames, parts: Sequence[_Part], texts: cells.Texts) -> None:
         """Write chains of pairs."""
         rows = np.concatenate([np.arange(one.first, one.last + 1, 2) for one in parts])
-        kind = heard.kind[rows]
+        kind = dialogue.kind[rows]
         begins = kind < _UPLOADS
-        self._write_requests(heard, rows[begins], texts)
-        self._write_answers(heard, rows[kind <= _ABORT], texts)
+        self._write_requests(dialogue, rows[begins], texts)
+        self._write_answers(dialogue, rows[kind <= _ABORT], texts)
         if (kind > _ABORT).any():
-            self._write_segments(heard, rows, parts, texts)
+            self._write_segments(dialogue, rows, parts, texts)
 
-    def _write_requests(self, heard: _Frames, rows: Ints, texts: cells.Texts) -> None:
+    def _write_requests(self, dialogue: _Frames, rows: Ints, texts: cells.Texts) -> None:
         """Write what begins transfers; it has one text for each object."""
         if not len(rows):
             return
-        keys = heard.node[rows].astype(np.uint64) << _HIGH | heard.word[rows] & _LOW
+        keys = dialogue.node[rows].astype(np.uint64) << _HIGH | dialogue.word[rows] & _LOW
         found, which = np.unique(keys, return_inverse=True)
-        said = [self._asked(key >> 32, key & 0xFFFF_FFFF) for key in found.tolist()]
-        texts.put(heard.place[rows], cells.of_texts(said)[which])
+        said = [self._request_text(key >> 32, key & 0xFFFF_FFFF) for key in found.tolist()]
+        texts.put(dialogue.place[rows], cells.of_texts(said)[which])
 
-    def _asked(self, node: int, request: int) -> str:
+    def _request_text(self, node: int, request: int) -> str:
         key = node, request
         if key not in self._texts:
             step = SdoChannel(node).request(0, request.to_bytes(_WHOLE, "little"))
             self._texts[key] = _text(Decoded("sdo", node, step.text))
         return self._texts[key]
 
-    def _write_answers(self, heard: _Frames, rows: Ints, texts: cells.Texts) -> None:
+    def _write_answers(self, dialogue: _Frames, rows: Ints, texts: cells.Texts) -> None:
         """Write what ends transfers of two frames, those of one object at once."""
         if not len(rows):
             return
-        kind, request, answer = heard.kind[rows], heard.word[rows], heard.word[rows + 1]
+        kind, request, answer = dialogue.kind[rows], dialogue.word[rows], dialogue.word[rows + 1]
         sends = (kind == _DOWNLOAD) | (
             (kind == _ABORT)
             & (request & np.uint64(sdo_frame.SPECIFIER) == ClientCommand.DOWNLOAD)
             & (request & np.uint64(sdo_frame.EXPEDITED) != 0)
         )
         value = np.where(sends, request, np.where(kind == _UPLOAD, answer, np.uint64(0))) >> _HIGH
-        request = heard.node[rows].astype(np.uint64) << _HIGH | request & _LOW
+        request = dialogue.node[rows].astype(np.uint64) << _HIGH | request & _LOW
         answer = np.where(kind == _ABORT, answer, answer & _LOW)
-        lasted = _durations(heard.at_us[rows + 1] - heard.at_us[rows])
-        place = heard.place[rows + 1]
+        lasted = _durations(dialogue.at_us[rows + 1] - dialogue.at_us[rows])
+        place = dialogue.place[rows + 1]
         requests, first = np.unique(request, return_inverse=True)
         answers, second = np.unique(answer, return_inverse=True)
         keys, which = np.unique(first * len(answers) + second, return_inverse=True)
@@ -389,16 +389,16 @@ class ColumnSdo:
             texts.put(place[found], cells.together(len(found), [*written, lasted[found]]))
 
     def _write_segments(
-        self, heard: _Frames, rows: Ints, parts: Sequence[_Part], texts: cells.Texts
+        self, dialogue: _Frames, rows: Ints, parts: Sequence[_Part], texts: cells.Texts
     ) -> None:
         """Write the pairs of segmented transfers, which are among those of these rows."""
-        kind, answers = heard.kind[rows], rows + 1
+        kind, answers = dialogue.kind[rows], rows + 1
         segment = kind >= _UPLOADS
         upload = segment & (kind < _DOWNLOADS)
         carrier = np.where(upload, answers, rows)
-        lengths = np.where(segment, 7 - (heard.word[carrier].astype(np.int64) >> 1 & 7), 0)
+        lengths = np.where(segment, 7 - (dialogue.word[carrier].astype(np.int64) >> 1 & 7), 0)
         opens = (kind == _OPENS_UPLOAD) | (kind == _OPENS_DOWNLOAD)
-        sized = np.where(kind == _OPENS_UPLOAD, heard.word[answers], heard.word[rows])
+        sized = np.where(kind == _OPENS_UPLOAD, dialogue.word[answers], dialogue.word[rows])
         sizes = np.where(sized & np.uint64(sdo_frame.SIZE_INDICATED), sized >> _HIGH, 0)
         begins, before = opens.copy(), np.zeros(len(rows), np.int64)
         sizes = sizes.astype(np.int64)
@@ -420,41 +420,46 @@ class ColumnSdo:
             if not len(chosen):
                 continue
             at = rows[steps[chosen]]
-            of, head = ofs[number[steps[chosen]]], self._heads.cells(heard.node[at])
+            of, head = ofs[number[steps[chosen]]], self._heads.cells(dialogue.node[at])
             so_far = [*cells.whole(have[chosen] - sent[chosen]), of, b" so far"]
             if uploads:
                 asked: list[cells.Part] = [head, b"asks for a segment, ", *so_far]
             else:
                 asked = [head, b"segment of ", *cells.whole(sent[chosen]), b" B, ", *so_far]
-            texts.put(heard.place[at], cells.together(len(at), asked))
-            open_yet = np.flatnonzero(heard.after[at] != 0)
+            texts.put(dialogue.place[at], cells.together(len(at), asked))
+            open_yet = np.flatnonzero(dialogue.after[at] != 0)
             if len(open_yet):
                 said = b"segment, " if uploads else b"segment confirmed, "
                 done = [head[open_yet], said, *cells.whole(have[chosen[open_yet]]), of[open_yet]]
-                texts.put(heard.place[at[open_yet] + 1], cells.together(len(open_yet), done))
-        self._write_opened(heard, rows[opens], texts)
-        ended = np.flatnonzero(segment & (heard.after[rows] == 0))
+                texts.put(dialogue.place[at[open_yet] + 1], cells.together(len(open_yet), done))
+        self._write_opened(dialogue, rows[opens], texts)
+        ended = np.flatnonzero(segment & (dialogue.after[rows] == 0))
         for end, start in zip(ended.tolist(), starts[number[ended]].tolist(), strict=True):
             row, opened = int(rows[end]), int(rows[start])
-            words = heard.word[carrier[start + 1 : end + 1]]
+            words = dialogue.word[carrier[start + 1 : end + 1]]
             data = _joined(words, lengths[start + 1 : end + 1])
-            lasted_us = int(heard.at_us[row + 1] - heard.at_us[opened])
-            said = self._transferred(heard, opened, row, data)
-            texts.put_one(int(heard.place[row + 1]), f"{said}{lasted_us / 1_000:.1f} ms)")
+            lasted_us = int(dialogue.at_us[row + 1] - dialogue.at_us[opened])
+            said = self._transferred(dialogue, opened, row, data)
+            texts.put_one(int(dialogue.place[row + 1]), f"{said}{lasted_us / 1_000:.1f} ms)")
 
     def _write_blocks(
-        self, heard: _Frames, blocks: Sequence[tuple[int, int]], texts: cells.Texts
+        self, dialogue: _Frames, blocks: Sequence[tuple[int, int]], texts: cells.Texts
     ) -> None:
         """Write segments of blocks, which are those of these rows."""
         rows = np.concatenate([np.arange(*one) for one in blocks])
-        numbers = (heard.word[rows] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.int64)
-        heads = self._heads.cells(heard.node[rows])
+        numbers = (dialogue.word[rows] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.int64)
+        heads = self._heads.cells(dialogue.node[rows])
         parts = [heads, b"segment ", *cells.whole(numbers), b" of a block"]
-        texts.put(heard.place[rows], cells.together(len(rows), parts))
+        texts.put(dialogue.place[rows], cells.together(len(rows), parts))
 
-    def _write_opened(self, heard: _Frames, rows: Ints, texts: cells.Texts) -> None:
+    def _write_opened(self, dialogue: _Frames, rows: Ints, texts: cells.Texts) -> None:
         """Write the answers after which segments follow."""
-        parts = heard.node[rows], heard.word[rows], heard.word[rows + 1], heard.place[rows + 1]
+        parts = (
+            dialogue.node[rows],
+            dialogue.word[rows],
+            dialogue.word[rows + 1],
+            dialogue.place[rows + 1],
+        )
         for *key, place in zip(*(part.tolist() for part in parts), strict=True):
             node, request, answer = key
             told = "opened", node, request, answer
@@ -465,10 +470,10 @@ class ColumnSdo:
                 self._texts[told] = _text(Decoded("sdo", node, step.text))
             texts.put_one(place, self._texts[told])
 
-    def _transferred(self, heard: _Frames, opened: int, last: int, data: bytes) -> str:
+    def _transferred(self, dialogue: _Frames, opened: int, last: int, data: bytes) -> str:
         """Return the text of a segmented transfer, without its duration."""
-        node = int(heard.node[opened])
-        pairs = [[heard.data(row + n) for n in (0, 1)] for row in (opened, last)]
+        node = int(dialogue.node[opened])
+        pairs = [[dialogue.data(row + n) for n in (0, 1)] for row in (opened, last)]
         key = node, data, *pairs[0]
         if key in self._texts:
             return self._texts[key]
@@ -476,7 +481,7 @@ class ColumnSdo:
         (request, answer), (asks, ends) = pairs
         channel.request(0, request)
         channel.response(0, answer)
-        carrier = ends if int(heard.kind[last]) < _DOWNLOADS else asks
+        carrier = ends if int(dialogue.kind[last]) < _DOWNLOADS else asks
         rest = 7 - (carrier[0] >> 1 & 7)
         if last > opened + 2:
             channel.take_segments(data[: len(data) - rest], not asks[0] & sdo_frame.TOGGLE)
@@ -495,19 +500,19 @@ class _Talk:
         blocks: segments of blocks, by the rows of the first and behind the last.
     """
 
-    def __init__(self, bus: BusDecoder, heard: _Frames, texts: cells.Texts) -> None:
-        self._bus, self._heard, self._texts = bus, heard, texts
+    def __init__(self, bus: BusDecoder, dialogue: _Frames, texts: cells.Texts) -> None:
+        self._bus, self._dialogue, self._texts = bus, dialogue, texts
         self.parts = list[_Part]()
         self.blocks = list[tuple[int, int]]()
 
     def follow(self, channel: SdoChannel, row: int, end: int) -> None:
         """Follow a channel, whose frames are those of these rows."""
-        heard = self._heard
+        dialogue = self._dialogue
         while row < end:
-            if heard.kind[row] and heard.before[row] == channel.turn():
+            if dialogue.kind[row] and dialogue.before[row] == channel.turn():
                 row = self._chain(channel, row)
             elif (direction := channel.block_from()) is not None and (
-                heard.asks[row] == (direction is TransferDirection.DOWNLOAD)
+                dialogue.asks[row] == (direction is TransferDirection.DOWNLOAD)
             ):
                 row = self._block(channel, row)
             else:
@@ -515,12 +520,12 @@ class _Talk:
                 row += 1
 
     def _one(self, channel: SdoChannel, row: int) -> None:
-        heard = self._heard
-        take = channel.request if heard.asks[row] else channel.response
-        step = take(int(heard.at_us[row]), heard.data(row))
+        dialogue = self._dialogue
+        take = channel.request if dialogue.asks[row] else channel.response
+        step = take(int(dialogue.at_us[row]), dialogue.data(row))
         node = channel.node
         text = _text(self._bus.sdo_step(node, step)) if step.ended else f"{node} sdo {step.text}"
-        self._texts.put_one(int(heard.place[row]), text)
+        self._texts.put_one(int(dialogue.place[row]), text)
 
     def _pair(self, channel: SdoChannel, row: int) -> int:
         """Take a pair frame by frame; return the row behind it."""
@@ -530,52 +535,52 @@ class _Talk:
 
     def _chain(self, channel: SdoChannel, row: int) -> int:
         """Take a chain of pairs; return the row behind it."""
-        heard, last = self._heard, int(self._heard.chain[row])
-        if heard.before[row] != 0:  # within a transfer
+        dialogue, last = self._dialogue, int(self._dialogue.chain[row])
+        if dialogue.before[row] != 0:  # within a transfer
             received, size = channel.received()
-            done = int(heard.done[row])
+            done = int(dialogue.done[row])
             last = min(last, done - 2)
             if last >= row:
                 self.parts.append(_Part(row, last, received, size))
                 self._segments(channel, row, last)
             return self._pair(channel, done) if done == last + 2 else last + 2
         self.parts.append(_Part(row, last))
-        if heard.after[last] == 0:
+        if dialogue.after[last] == 0:
             channel.end_exchanges()
             return last + 2
         opened = last
-        while heard.kind[opened] >= _UPLOADS:
+        while dialogue.kind[opened] >= _UPLOADS:
             opened -= 2
         if opened > row:
             channel.end_exchanges()
         for place in (opened, opened + 1):
-            take = channel.request if heard.asks[place] else channel.response
-            take(int(heard.at_us[place]), heard.data(place))
+            take = channel.request if dialogue.asks[place] else channel.response
+            take(int(dialogue.at_us[place]), dialogue.data(place))
         if last > opened:
             self._segments(channel, opened + 2, last)
         return last + 2
 
     def _segments(self, channel: SdoChannel, row: int, last: int) -> None:
         """Let a channel take the segments in some pairs."""
-        heard = self._heard
-        upload = heard.kind[row] < _DOWNLOADS
-        words = heard.word[row + upload : last + 2 : 2]
+        dialogue = self._dialogue
+        upload = dialogue.kind[row] < _DOWNLOADS
+        words = dialogue.word[row + upload : last + 2 : 2]
         lengths = 7 - (words.astype(np.int64) >> 1 & 7)
-        channel.take_segments(_joined(words, lengths), bool(heard.kind[last] & 1))
+        channel.take_segments(_joined(words, lengths), bool(dialogue.kind[last] & 1))
 
     def _block(self, channel: SdoChannel, row: int) -> int:
         """Take segments of a block; return the row behind them."""
-        heard, end = self._heard, int(self._heard.run[row])
+        dialogue, end = self._dialogue, int(self._dialogue.run[row])
         if end <= row:  # an abort, as no segment has number 0
             self._one(channel, row)
             return row + 1
-        commands, last = heard.word[row:end] & np.uint64(0xFF), None
+        commands, last = dialogue.word[row:end] & np.uint64(0xFF), None
         lasts = np.flatnonzero(commands & np.uint64(sdo_frame.BLOCK_LAST))
         if len(lasts):
             end = row + int(lasts[0]) + 1
             last = int(commands[end - row - 1]) & sdo_frame.BLOCK_SEQNO
         numbers = (commands[: end - row] & np.uint64(sdo_frame.BLOCK_SEQNO)).astype(np.uint8)
-        data = _octets(heard.word[row:end]).tobytes()
+        data = _octets(dialogue.word[row:end]).tobytes()
         channel.take_block(numbers.tobytes(), data, last)
         self.blocks.append((row, end))
         return end

@@ -229,9 +229,9 @@ class BusDecoder:
         """
         return not self.memory(node).number(*node_memory.HEARTBEAT_TIME)
 
-    def guard(self, node: int, *, asked: bool) -> None:
+    def guard(self, node: int, *, requested: bool) -> None:
         """Learn that the last frame of error control of a node was a guarding request, or not."""
-        if asked:
+        if requested:
             self._guarded.add(node)
         else:
             self._guarded.discard(node)
@@ -288,7 +288,7 @@ class BusDecoder:
     def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
         guarded = node in self._guarded and self.answers_guarding(node)
         decoded = services.decode_error_control(node, frame, guarded=guarded)
-        self.guard(node, asked=frame.remote)
+        self.guard(node, requested=frame.remote)
         if decoded.kind == "boot-up" and self.memory(node).boot():
             self.renamed += 1
             indices = self.memory(node).indices

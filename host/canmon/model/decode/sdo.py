@@ -461,7 +461,7 @@ class SdoChannel:
         """Return which request and answer continue the dialogue, if the answer follows directly.
 
         0 if no transfer runs, 1 and 2 for an upload segment with this toggle bit plus 1, 3 and 4
-        for a download segment with this toggle bit plus 3, -1 for all else.
+        for a download segment with this toggle bit plus 3, -1 for anything else.
         """
         running = self._running
         if running is None:
