@@ -292,12 +292,10 @@ class ColumnSdo:
             self._writers.clear()
         self._known, count = known, len(frames)
         side = _Sides(np.zeros(count, np.int16), np.zeros(count, np.int64), np.zeros(count, bool))
-        channels = list[SdoChannel]()
+        numbers = dict[SdoChannel, int]()
         for channel, asks, rows in speakers:
-            if channel not in channels:
-                channels.append(channel)
-            side.channel[rows], side.node[rows] = channels.index(channel), channel.node
-            side.asks[rows] = asks
+            side.channel[rows] = numbers.setdefault(channel, len(numbers))
+            side.node[rows], side.asks[rows] = channel.node, asks
         rows = np.sort(np.concatenate([rows for _, _, rows in speakers]))
         remote = frames.ident[rows] & np.uint32(REMOTE) != 0
         odd = remote | (frames.dlc[rows] != _WHOLE)
@@ -307,9 +305,9 @@ class ColumnSdo:
         if not len(rows):
             return
         dialogue = _Frames.of(frames, rows, places, side)
-        cuts = np.searchsorted(np.sort(side.channel[rows]), np.arange(len(channels) + 1)).tolist()
+        cuts = np.searchsorted(np.sort(side.channel[rows]), np.arange(len(numbers) + 1)).tolist()
         talk = _Talk(self._bus, dialogue, texts)
-        for channel, begin, end in zip(channels, cuts, cuts[1:], strict=False):
+        for channel, begin, end in zip(numbers, cuts, cuts[1:], strict=False):
             talk.follow(channel, begin, end)
         if talk.blocks:
             self._write_blocks(dialogue, talk.blocks, texts)
@@ -383,7 +381,7 @@ class ColumnSdo:
                 carries = bool(sends[found[0]])
                 valued = carries or bool(kind[found[0]] == _UPLOAD)
                 writer = self._writers[pair] = _ValueText(
-                    self._bus, pair, valued=valued, sends=carries
+                    self._bus, pair, self._texts, valued=valued, sends=carries
                 )
             written = writer.parts(value[found])
             texts.put(place[found], cells.together(len(found), [*written, lasted[found]]))
@@ -621,16 +619,22 @@ class _ValueText:
     Args:
         bus: decodes the samples.
         pair: node, request, and answer, without the value.
+        texts: texts that are kept.
         valued: whether there is a value.
         sends: whether the request has it.
     """
 
     def __init__(
-        self, bus: BusDecoder, pair: tuple[int, int, int], *, valued: bool, sends: bool
+        self,
+        bus: BusDecoder,
+        pair: tuple[int, int, int],
+        texts: dict[Any, str],
+        *,
+        valued: bool,
+        sends: bool,
     ) -> None:
-        self._bus, self._sends = bus, sends
+        self._bus, self._texts, self._sends = bus, texts, sends
         self._node, self._request, self._answer = pair
-        self._said: dict[int, str] = {}
         self._write: Callable[[Ints], Sequence[cells.Part]] | None = None
         self._head = self._tail = b""
         self._tried = not valued
@@ -647,11 +651,10 @@ class _ValueText:
         return [cells.of_texts(map(self._text, found.tolist()))[which]]
 
     def _text(self, value: int) -> str:
-        if value not in self._said:
-            if len(self._said) >= _MOST_TEXTS:
-                self._said.clear()
-            self._said[value] = self._decoded(value)
-        return self._said[value]
+        key = self._node, self._request, self._answer, value
+        if key not in self._texts:
+            self._texts[key] = self._decoded(value)
+        return self._texts[key]
 
     def _decoded(self, value: int) -> str:
         channel, pair = SdoChannel(self._node), [self._request, self._answer]
@@ -668,8 +671,6 @@ class _ValueText:
         size = 4 - (command >> 2 & 3) if sized else 4
         entry = self._request >> 8 & 0xFFFF, self._request >> 24 & 0xFF
         write = _value_writer(self._bus.memory(self._node).describe(*entry), size, sized=sized)
-        if write is None:
-            return
         samples = [0, 1, 0x7F, 0x80, 0xFFFF, 0x8000, 0x7FFF_FFFF, 0x8000_0000, 0xFFFF_FFFF]
         numbers = np.array([*samples, 0x1234_5678, 0xFEDC_BA98, 0x0001_8000])
         written = cells.joined(len(numbers), [*write(numbers), b"\n"]).split("\n")[:-1]
@@ -682,15 +683,21 @@ class _ValueText:
 
 def _value_writer(
     text: ObjectText, size: int, *, sized: bool
-) -> Callable[[Ints], Sequence[cells.Part]] | None:
-    """Return what writes values of some bytes, as `ObjectText.read` does; None for some kinds."""
-    kind = text.kind
+) -> Callable[[Ints], Sequence[cells.Part]]:
+    """Return what writes values of some bytes, as `ObjectText.read` does."""
+    kind, sent = text.kind, size
+
+    def read(value: int) -> str:
+        return one_line(
+            text.read((value & 0xFFFF_FFFF).to_bytes(4, "little")[:sent], sized=sized)[1]
+        )
+
     if kind is not None and not sized and 0 < kind.size < size:
         size = kind.size
     mask = (1 << 8 * size) - 1
-    if kind is None or text.in_hex:
+    if kind is None or (text.in_hex and not 0 < kind.size < size):
         return lambda values: [b"0x", cells.hexadecimal(values & mask, size)]
     if not kind.is_integer or kind.bits != 8 * size or text.factor != 1:
-        return None
+        return lambda values: [cells.of_few(values, read)]
     sign = 1 << 8 * size - 1 if kind.signed else 0
     return lambda values: cells.whole((values & mask ^ sign) - sign)
