@@ -86,7 +86,8 @@ def together(count: int, parts: Sequence[Part]) -> Cells:
 def joined(count: int, parts: Sequence[Part]) -> str:
     """Return all lines as one text."""
     rows = together(count, parts)
-    return rows[rows != 0].tobytes().decode("utf-8", "surrogatepass")
+    found: bytes = rows[rows != 0].tobytes()
+    return found.decode("utf-8", "surrogatepass")
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:

@@ -271,7 +271,7 @@ def _take_alike(
         firsts = chosen[order[cuts]]
         routes = [groups[number].route for number in (kinds[firsts] >> 5).tolist()]
         said = [
-            one_line(decoded_text(route(one.at_us, one.frame)))  # type: ignore[arg-type]
+            one_line(decoded_text(route(one.at_us, one.frame)))
             for route, one in zip(routes, records(select(frames, rows[firsts])), strict=True)
         ]
         which = np.repeat(np.arange(len(cuts)), np.diff(cuts, append=len(order)))
@@ -325,9 +325,9 @@ class _Lessons:
                 end = boot >> 7
         running = [number for number, channel in self._speakers.items() if self._learns(channel)]
         if running:
-            found = np.flatnonzero(np.isin(self._idents[begin:end], running))
-            if len(found):
-                end = begin + int(found[0])
+            rows = np.flatnonzero(np.isin(self._idents[begin:end], running))
+            if len(rows):
+                end = begin + int(rows[0])
         return end
 
     def _learns(self, channel: SdoChannel) -> bool:

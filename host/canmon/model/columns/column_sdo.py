@@ -437,8 +437,8 @@ class ColumnSdo:
             words = dialogue.word[carrier[start + 1 : end + 1]]
             data = _joined(words, lengths[start + 1 : end + 1])
             lasted_us = int(dialogue.at_us[row + 1] - dialogue.at_us[opened])
-            said = self._transferred(dialogue, opened, row, data)
-            texts.put_one(int(dialogue.place[row + 1]), f"{said}{lasted_us / 1_000:.1f} ms)")
+            text = self._transferred(dialogue, opened, row, data)
+            texts.put_one(int(dialogue.place[row + 1]), f"{text}{lasted_us / 1_000:.1f} ms)")
 
     def _write_blocks(
         self, dialogue: _Frames, blocks: Sequence[tuple[int, int]], texts: cells.Texts

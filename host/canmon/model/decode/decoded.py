@@ -103,10 +103,27 @@ class Transfer:
     ) -> Transfer:
         """Return the same with what is known of its object; `replace` would be slow."""
         return Transfer(
-            *(self.at_us, self.duration_us, self.node, self.direction, self.mode),
-            *(self.index, self.sub, self.outcome, self.data, self.abort_code, self.by_client),
-            *(self.retries, self.partial, self.flaws, self.sized),
-            *(length, name, value, text, unit, source),
+            self.at_us,
+            self.duration_us,
+            self.node,
+            self.direction,
+            self.mode,
+            self.index,
+            self.sub,
+            self.outcome,
+            self.data,
+            self.abort_code,
+            self.by_client,
+            self.retries,
+            self.partial,
+            self.flaws,
+            self.sized,
+            length,
+            name,
+            value,
+            text,
+            unit,
+            source,
         )
 
     def __str__(self) -> str:

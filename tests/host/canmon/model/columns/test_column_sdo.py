@@ -157,7 +157,7 @@ def dialogues(draw: st.DrawFn, node: int) -> list[CanFrame]:
             case 6 | 7 as way:
                 length = draw(st.sampled_from((1, 3, 127)))
                 frames += speaker.block(draw(some), length, upload=way == 6)
-    if frames and draw(st.booleans()):
+    if draw(st.booleans()) and frames:
         for place in sorted(draw(st.sets(st.integers(0, len(frames) - 1), max_size=4)))[::-1]:
             short_one = CanFrame(0x600 + node, b"\x40")
             ways: tuple[list[CanFrame], ...] = [], [frames[place]] * 2, [short_one, frames[place]]
