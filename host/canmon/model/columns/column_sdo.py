@@ -396,22 +396,24 @@ class ColumnSdo:
         carrier = np.where(upload, answers, rows)
         lengths = np.where(segment, 7 - (dialogue.word[carrier].astype(np.int64) >> 1 & 7), 0)
         opens = (kind == _OPENS_UPLOAD) | (kind == _OPENS_DOWNLOAD)
-        sized = np.where(kind == _OPENS_UPLOAD, dialogue.word[answers], dialogue.word[rows])
-        sizes = np.where(sized & np.uint64(sdo_frame.SIZE_INDICATED), sized >> _HIGH, 0)
-        begins, before = opens.copy(), np.zeros(len(rows), np.int64)
-        sizes = sizes.astype(np.int64)
-        count = 0
+        begins, running, count = opens.copy(), list[_Part](), 0
         for part in parts:
-            if not begins[count] and segment[count]:
-                begins[count], before[count], sizes[count] = True, part.received, part.size
+            if segment[count]:
+                begins[count] = True
+                running.append(part)
             count += (part.last - part.first) // 2 + 1
-        number = np.cumsum(begins) - 1
-        starts = np.flatnonzero(begins)
-        sums = np.cumsum(lengths)
-        offsets = before[starts] - sums[starts] + lengths[starts]
+        number, starts, sums = np.cumsum(begins) - 1, np.flatnonzero(begins), np.cumsum(lengths)
+        offsets = lengths[starts] - sums[starts]
+        sized = dialogue.word[rows[starts] + (kind[starts] == _OPENS_UPLOAD)]
+        sizes = (sized >> _HIGH).astype(np.int64)
+        sizes[sized & np.uint64(sdo_frame.SIZE_INDICATED) == 0] = 0
+        if running:
+            goes_on = segment[starts]
+            offsets[goes_on] += np.array([part.received for part in running])
+            sizes[goes_on] = [part.size for part in running]
         steps = np.flatnonzero(segment)
         sent = lengths[steps]
-        ofs = cells.of_few(sizes[starts], lambda size: f" of {size} B" if size else " B")
+        ofs = cells.of_few(sizes, lambda size: f" of {size} B" if size else " B")
         have = sums[steps] + offsets[number[steps]]
         for uploads in (True, False):
             chosen = np.flatnonzero(upload[steps] == uploads)
@@ -423,7 +425,7 @@ class ColumnSdo:
             if uploads:
                 asked: list[cells.Part] = [head, b"asks for a segment, ", *so_far]
             else:
-                asked = [head, b"segment of ", *cells.whole(sent[chosen]), b" B, ", *so_far]
+                asked = [head, b"segment of ", _digit(sent[chosen]), b" B, ", *so_far]
             texts.put(dialogue.place[at], cells.together(len(at), asked))
             open_yet = np.flatnonzero(dialogue.after[at] != 0)
             if len(open_yet):
@@ -599,6 +601,10 @@ def _joined(words: _Words, lengths: Ints) -> bytes:
 
 def _text(decoded: Decoded) -> str:
     return one_line(decoded_text(decoded))
+
+
+def _digit(numbers: Ints) -> cells.Cells:
+    return (numbers + ord("0")).astype(np.uint8)[:, np.newaxis]
 
 
 def _durations(spans_us: Ints) -> cells.Cells:
