@@ -92,7 +92,7 @@ class HostLimit(Copyable):
     Before a host advances the time, it calls `count` if `due_us` has passed.
 
     Attributes:
-        due_us: when the next wait is counted.
+        due_us: time from which the next wait is counted.
     """
 
     due_us: int = NEVER

@@ -373,7 +373,7 @@ class Bench(BenchDevice, Closing):
                 ports of devices in the plan.
             terminal: terminal of the operator of real devices. The default is standard input and
                 output.
-            limit: how long hosts may wait, as in `Bench`.
+            limit: longest time that hosts may wait, as in `Bench`.
 
         Raises:
             ValueError: a device cannot be made, or an option, an input, a fault or the mode is

@@ -128,12 +128,12 @@ _TWO_BYTES: Final = 2 << 2 | sdo_frame.SIZE_INDICATED
 
 
 def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
-    """Return the rows of answers with which a transfer may end, or begin, that teaches something.
+    """Return the rows of answers that begin or end a transfer from which the decoder may learn.
 
     Args:
         frames: frames of one bus.
-        rows: the rows of the answers of a server.
-        memory: what is known of its node.
+        rows: rows of the answers of a server.
+        memory: memory of the node of the server.
     """
     words = frames.payload[rows]
     index = (words >> np.uint64(8) & np.uint64(0xFFFF)).astype(np.int64)
@@ -150,7 +150,7 @@ def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
 
 
 def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
-    """Return whether a value of an object may teach something; see `teachers`."""
+    """Return whether the decoder may learn from a value of an object, as in `teachers`."""
     return entry[0] in TEACHING or (entry == STATUSWORD and not memory.has_statusword)
 
 
@@ -168,17 +168,17 @@ class _Frames(NamedTuple):
     """SDO frames of 8 bytes, channel by channel; a row for each.
 
     Attributes:
-        at_us: times.
-        word: data, as a number.
-        node: the server.
-        asks: whether the client sent it.
-        place: the row in the texts.
-        kind: the kind of pair that begins with it; 0 for none.
-        before: what `SdoChannel.turn` is before the pair.
-        after: what it is after the pair.
-        chain: the last pair of the chain that begins with the pair.
-        done: the next pair, in steps of two, with which a transfer ends.
-        run: the row after the last that can be a segment of one block with it.
+        at_us: time of each frame.
+        word: data of each frame, as a number.
+        node: node-ID of the server.
+        asks: whether the client sent the frame.
+        place: row of the frame in the texts.
+        kind: kind of pair that begins with the frame; 0 if no pair begins with it.
+        before: value of `SdoChannel.turn` before the pair.
+        after: value of `SdoChannel.turn` after the pair.
+        chain: last pair of the chain that begins with the pair.
+        done: next pair, in steps of two, that ends a transfer.
+        run: row after the last frame that can be a segment of the same block.
     """
 
     at_us: Ints
@@ -248,8 +248,8 @@ class _Part(NamedTuple):
     Attributes:
         first: row of the first pair.
         last: row of the last pair.
-        received: bytes of the running transfer before it.
-        size: of this transfer, 0 if unknown.
+        received: number of bytes of the running transfer before the first pair.
+        size: size of this transfer in bytes, 0 if unknown.
     """
 
     first: int

@@ -506,12 +506,12 @@ class SdoChannel:
         return running.direction if running.block_last is None else None
 
     def take_block(self, numbers: bytes, data: bytes, last: int | None) -> None:
-        """Take segments of a block that come.
+        """Take segments of a block.
 
         Args:
-            numbers: the number of each.
-            data: 7 bytes of each.
-            last: number of the last of the transfer; None if it is not among them.
+            numbers: number of each segment.
+            data: data of the segments, 7 bytes for each.
+            last: number of the last segment of the transfer; None if this segment did not come.
         """
         running = self._running
         assert running is not None, "a transfer runs"
