@@ -82,7 +82,7 @@ SCRIPTS: Final = {
             "tail -5 test_ice.py",
             "pytest -q --bench rig.toml --tb=short test_ice.py",
             "sed -i 's/0x6060, 3, size=1)/&; write(wheel, 0x6083, 1000, size=4)/' robot.py",
-            "pytest -q --bench rig.toml",
+            "pytest -q --bench rig.toml test_robot.py test_ice.py",
         ),
     ),
 }
