@@ -9,6 +9,7 @@ from unittest.mock import patch
 
 import pytest
 from click.testing import CliRunner
+from textual import _wait
 from textual.pilot import Pilot
 from textual.widgets import Input, Markdown
 
@@ -78,7 +79,8 @@ def at_desk(path: Path, act: Act, size: tuple[int, int] = (80, 24)) -> None:
             finally:
                 desk.link._hang_up()
 
-    with patch.object(editor_app, "PAINT_S", 3_600):
+    # The components run in this process: Textual would wait for it to be idle, a second each time.
+    with patch.object(editor_app, "PAINT_S", 3_600), patch.object(_wait, "SLEEP_IDLE", 1):
         asyncio.run(work())
 
 
