@@ -1,7 +1,8 @@
-"""The whole test run: the plug-in from the tree, Hypothesis, Ctrl-C, what coverage measures."""
+"""The whole run: the plug-in from the tree, Hypothesis, garbage, Ctrl-C, what coverage measures."""
 
 from __future__ import annotations
 
+import gc
 import shutil
 import signal
 import subprocess
@@ -49,6 +50,18 @@ def user_mode_linux(tmp_path_factory: pytest.TempPathFactory) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell
         signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C works in children
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Keep modules and items from the garbage collector: they stay to the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(wrapper=True)
