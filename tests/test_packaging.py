@@ -102,6 +102,8 @@ def test_the_sdist_is_the_tree(unpacked: Path) -> None:
     assert links(unpacked) == links(ROOT)
 
 
+@pytest.mark.realtime  # as some of these are
+@pytest.mark.timeout(300)
 def test_the_sdist_passes_its_own_tests(unpacked: Path) -> None:
     process = subprocess.run(
         [
