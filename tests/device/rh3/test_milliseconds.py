@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.rh3.driven import M_S, Driven
@@ -11,6 +13,8 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.wire.modbus import Command, Mode
 
 COUNTS_S = round(M_S)
+
+Act = tuple[int, object]
 
 orders = st.one_of(
     st.tuples(st.sampled_from(["target_speed_left", "target_speed_right"]), st.integers(-9, 9)).map(
@@ -52,11 +56,24 @@ STALLED = [
 ]
 
 
+def test_a_wheel_that_stalls_and_is_cleared_is_that_of_a_base_that_is_ticked() -> None:
+    compare(BaseParameters(), STALLED)
+
+
+def test_an_order_that_takes_effect_between_ticks_does_so_in_its_millisecond() -> None:
+    orders: tuple[Act, ...] = ((3, {"target_speed_left": COUNTS_S // 5}), (60, {"watchdog_ms": 90}))
+    compare(BaseParameters(delay_ms=40), [*orders, *orders])
+
+
+@pytest.mark.unmeasured
 @given(parameters, acts)
-@example(BaseParameters(), STALLED)
 def test_they_are_those_of_a_base_that_is_ticked(
     parameters: BaseParameters, acts: list[tuple[int, object]]
 ) -> None:
+    compare(parameters, acts)
+
+
+def compare(parameters: BaseParameters, acts: Sequence[Act]) -> None:
     ticked, left_alone = Driven(parameters), Driven(parameters)
     for driven in (ticked, left_alone):
         driven.enable()
