@@ -147,14 +147,14 @@ class CanEnd(EndFields):
         if traffic:
             self.segment.send(self, now_us, traffic)
 
-    @in_kernel
     def enqueue(self, frames: Frames) -> None:
         """Append frames to the queue."""
         behind = frames
         if not self.waiting:  # mostly one: without a queue two objects less are touched
             self.next, behind = frames[0], frames[1:]
         if behind:
-            self._behind = self._behind or deque()
+            if self._behind is None:
+                self._behind = deque()
             self._behind.extend(behind)
         self.waiting += len(frames)
 

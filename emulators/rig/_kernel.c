@@ -147,15 +147,15 @@ static PyMemberDef segment_fields[] = {
 /* The Python methods, and whether they are to do everything. */
 
 enum { STATION_WAKE, TIMETABLE_ENTER, TIMETABLE_TAKE, END_POLL, END_SEND, END_RECEIVE,
-       END_ENQUEUE, ARBITER_PUSH, SEGMENT_PLAN, SEGMENT_DELIVER, SEGMENT_ADVANCE,
+       ARBITER_PUSH, SEGMENT_PLAN, SEGMENT_DELIVER, SEGMENT_ADVANCE,
        SEGMENT_ADVANCE_UNTIL, SEGMENT_SEND, IGNORE, METHODS };
 static PyObject *reference[METHODS];
 static int enabled = 1;
-static PyObject *empty_tuple;
+static PyObject *empty_tuple, *deque;
 
 #define NAMES(name) static PyObject *s_##name;
 #define EACH_NAME(name) name(advance) name(send) name(poll) name(tick) name(due_us) name(popleft) \
-    name(append) name(_is_sound) name(_notify_changes) name(receivers) name(now_us) \
+    name(append) name(extend) name(_is_sound) name(_notify_changes) name(receivers) name(now_us) \
     name(passed_us) name(until_us)
 EACH_NAME(NAMES)
 
@@ -189,6 +189,20 @@ done(PyObject *result) /* drops what a call returned; -1 if it raised */
     return 0;
 }
 
+static inline us
+read_whole(PyObject *item, int *over) /* as `PyLong_AsLongLongAndOverflow` */
+{
+#if PY_VERSION_HEX < 0x030C0000 && PYLONG_BITS_IN_DIGIT == 30
+    if (PyLong_CheckExact(item) && (size_t)Py_SIZE(item) <= 2) { /* digits: 3 % of a full bus */
+        const digit *digits = ((PyLongObject *)item)->ob_digit;
+        us low = Py_SIZE(item) ? digits[0] : 0;
+        *over = 0;
+        return Py_SIZE(item) > 1 ? (us)digits[1] << 30 | low : low;
+    }
+#endif
+    return PyLong_AsLongLongAndOverflow(item, over);
+}
+
 static int
 read_time(PyObject *item, us *value)
 {
@@ -202,7 +216,7 @@ read_time(PyObject *item, us *value)
         return 0;
     }
     int over; /* `PyLong_AsLongLong` takes four times as long for NEVER: 4 % of an SDO */
-    *value = PyLong_AsLongLongAndOverflow(item, &over);
+    *value = read_whole(item, &over);
     if (over)
         PyErr_SetString(PyExc_OverflowError, "a time is beyond all others");
     return *value == -1 && PyErr_Occurred() ? -1 : 0;
@@ -242,20 +256,12 @@ wrong_number(const char *name, Py_ssize_t count, Py_ssize_t wanted)
 static int
 less(PyObject *a, PyObject *b)
 {
-#if PY_VERSION_HEX < 0x030C0000 && PYLONG_BITS_IN_DIGIT == 30
-    if (PyLong_CheckExact(a) && PyLong_CheckExact(b) && (size_t)Py_SIZE(a) <= 2 &&
-        (size_t)Py_SIZE(b) <= 2 && Py_SIZE(a) && Py_SIZE(b)) { /* digits: 3 % of a full bus */
-        const digit *x = ((PyLongObject *)a)->ob_digit, *y = ((PyLongObject *)b)->ob_digit;
-        uint64_t first = x[0] | (Py_SIZE(a) > 1 ? (uint64_t)x[1] << 30 : 0);
-        return first < (y[0] | (Py_SIZE(b) > 1 ? (uint64_t)y[1] << 30 : 0));
-    }
-#endif
     int over_a, over_b;
     if (!PyLong_CheckExact(a) || !PyLong_CheckExact(b)) {
         PyErr_SetString(PyExc_TypeError, "a heap of the kernel holds whole numbers");
         return -1;
     }
-    us x = PyLong_AsLongLongAndOverflow(a, &over_a), y = PyLong_AsLongLongAndOverflow(b, &over_b);
+    us x = read_whole(a, &over_a), y = read_whole(b, &over_b);
     return over_a || over_b ? PyObject_RichCompareBool(a, b, Py_LT) : x < y;
 }
 
@@ -345,10 +351,10 @@ read_frame(PyObject *item, Frame *frame) /* 1 if it is one; 0 without an excepti
         !flag(PyTuple_GET_ITEM(item, 2), &frame->remote) ||
         !flag(PyTuple_GET_ITEM(item, 3), &frame->extended))
         return 0;
-    us id = PyLong_AsLongLongAndOverflow(can_id, &over);
+    us id = read_whole(can_id, &over);
     if (over || id < 0 || id > (frame->extended ? 0x1FFFFFFF : 0x7FF) || PyBytes_GET_SIZE(data) > 8)
         return 0;
-    us remote_length = PyLong_AsLongLongAndOverflow(length, &over);
+    us remote_length = read_whole(length, &over);
     if (over || remote_length < 0 || remote_length > (frame->remote ? 8 : 0))
         return 0;
     frame->length = (int)PyBytes_GET_SIZE(data);
@@ -425,6 +431,21 @@ fill_tables(void)
 
 /* Timetable and stations. */
 
+/* The list that was found last: a SYNC wakes all stations for one tick, and their heartbeats are
+   due in one (4 % of a full bus). It is borrowed from a dict that has not changed since: no two
+   dicts, and no two states of one, have the same version. */
+#if PY_VERSION_HEX < 0x030C0000
+static uint64_t found_version;
+static us found_us;
+static PyObject *found_list;
+#define VERSION(dict) (((PyDictObject *)(dict))->ma_version_tag)
+#define FOUND(dict, at_us) (found_version == VERSION(dict) && found_us == (at_us) ? found_list : NULL)
+#define FIND(dict, us, list) (found_version = VERSION(dict), found_us = (us), found_list = (list))
+#else
+#define FOUND(dict, at_us) NULL
+#define FIND(dict, us, list)
+#endif
+
 static int
 enter(Timetable *table, Station *station, us at_us)
 {
@@ -444,18 +465,28 @@ enter(Timetable *table, Station *station, us at_us)
     at_us = (at_us + station->tick_us - 1) / station->tick_us * station->tick_us;
     if (at_us >= station->at_us)
         return 0;
+    PyObject *there = FOUND(table->stations, at_us);
+    if (there != NULL) {
+        if (PyList_Append(there, (PyObject *)station) < 0)
+            return -1;
+        station->at_us = at_us;
+        return 0;
+    }
     PyObject *key = PyLong_FromLongLong(at_us);
     if (key == NULL)
         return -1;
     int result = -1;
-    PyObject *there = PyDict_GetItemWithError(table->stations, key);
+    there = PyDict_GetItemWithError(table->stations, key);
     if (there != NULL && PyList_CheckExact(there)) {
         result = PyList_Append(there, (PyObject *)station);
+        FIND(table->stations, at_us, there);
     } else if (!PyErr_Occurred()) {
         PyObject *made = PyList_New(1);
         if (made != NULL) {
             PyList_SET_ITEM(made, 0, Py_NewRef(station));
             result = PyDict_SetItem(table->stations, key, made);
+            if (result == 0)
+                FIND(table->stations, at_us, made);
             Py_DECREF(made);
         }
         if (result == 0)
@@ -651,7 +682,7 @@ same_rank(PyObject *heads, Py_ssize_t place, us head)
     int over;
     if (place >= PyList_GET_SIZE(heads))
         return 0;
-    us other = PyLong_AsLongLongAndOverflow(PyList_GET_ITEM(heads, place), &over);
+    us other = read_whole(PyList_GET_ITEM(heads, place), &over);
     return over || other >> NUMBER_BITS == head >> NUMBER_BITS;
 }
 
@@ -670,13 +701,14 @@ set_winner(Segment *segment, PyObject *end) /* one, or none if `end` is NULL */
         Py_DECREF(made);
         return 0;
     }
-    if (count && PyList_GET_SIZE(winners) == 1)
+    Py_ssize_t before = PyList_GET_SIZE(winners);
+    if (count && before == 1)
         return PyList_SetItem(winners, 0, Py_NewRef(end));
-    if (PyList_GET_SIZE(winners) == 1) {
-        PyObject *before = PyList_GET_ITEM(winners, 0);
+    if (before == 1) {
+        PyObject *last = PyList_GET_ITEM(winners, 0);
         Py_SET_SIZE(winners, 0);
-        Py_DECREF(before);
-    } else if (PyList_SetSlice(winners, 0, PyList_GET_SIZE(winners), NULL) < 0)
+        Py_DECREF(last);
+    } else if (before && PyList_SetSlice(winners, 0, before, NULL) < 0)
         return -1;
     return count ? PyList_Append(winners, end) : 0; /* the list keeps its room */
 }
@@ -698,7 +730,7 @@ plan(Segment *segment) /* CanSegment._plan */
         return 0;
     }
     PyObject *item = PyList_GET_ITEM(heads, 0);
-    us head = PyLong_CheckExact(item) ? PyLong_AsLongLongAndOverflow(item, &over) : (over = 1);
+    us head = PyLong_CheckExact(item) ? read_whole(item, &over) : (over = 1);
     if (over || same_rank(heads, 1, head) || same_rank(heads, 2, head) || arbiter->free > FAR)
         return done(by_reference(SEGMENT_PLAN, (PyObject *)segment, NULL, 0));
     PyObject *number = PyLong_FromLongLong(head & ((1 << NUMBER_BITS) - 1));
@@ -981,9 +1013,37 @@ plan_anew(Segment *segment) /* CanSegment._plan_anew */
 }
 
 static int
+enqueue(End *end, PyObject *frames) /* CanEnd.enqueue, of a tuple that is not empty */
+{
+    Py_ssize_t count = PyTuple_GET_SIZE(frames), place = 0;
+    if (!end->waiting) {
+        PyObject *next = PyTuple_GET_ITEM(frames, place++);
+        put(&end->next, next);
+    }
+    if (place < count) {
+        PyObject *behind = PyTuple_GetSlice(frames, place, count), *queue = Py_XNewRef(end->behind);
+        int result = behind == NULL ? -1 : 0;
+        if (result == 0 && (queue == NULL || queue == Py_None)) {
+            Py_XSETREF(queue, PyObject_CallNoArgs(deque));
+            result = queue == NULL ? -1 : 0;
+            if (result == 0)
+                put(&end->behind, queue);
+        }
+        if (result == 0)
+            result = done(PyObject_CallMethodOneArg(queue, s_extend, behind));
+        Py_XDECREF(behind);
+        Py_XDECREF(queue);
+        if (result < 0)
+            return -1;
+    }
+    end->waiting += count;
+    return 0;
+}
+
+static int
 send_frames(Segment *segment, End *end, us now_us, PyObject *frames) /* CanSegment.send */
 {
-    PyObject *number, *next;
+    PyObject *number;
     if (segment->now_us < now_us && advance(segment, now_us) < 0)
         return -1;
     Py_ssize_t count = PyTuple_CheckExact(frames) ? PyTuple_GET_SIZE(frames) : 0;
@@ -1014,15 +1074,8 @@ send_frames(Segment *segment, End *end, us now_us, PyObject *frames) /* CanSegme
         if (plan_anew(segment) < 0)
             return -1;
     }
-    if (idle && count == 1) { /* CanEnd.enqueue */
-        next = PyTuple_GET_ITEM(frames, 0);
-        put(&end->next, next);
-        end->waiting = 1;
-    } else {
-        PyObject *args[] = {frames};
-        if (done(by_reference(END_ENQUEUE, (PyObject *)end, args, 1)) < 0)
-            return -1;
-    }
+    if (enqueue(end, frames) < 0)
+        return -1;
     if (!idle)
         return 0;
     if (!is_whole(segment) || (PyObject *)arbiter != segment->arbiter) {
@@ -1465,7 +1518,7 @@ run(PyObject *module, PyObject *const *args, Py_ssize_t count)
 
 static const char *const method_names[METHODS] = {
     "Station._wake", "Timetable.enter", "Timetable.take", "CanEnd.poll", "CanEnd.send",
-    "CanEnd.receive", "CanEnd.enqueue", "CanArbiter.push", "CanSegment._plan",
+    "CanEnd.receive", "CanArbiter.push", "CanSegment._plan",
     "TransmissionOutcomes._deliver", "CanSegment.advance", "CanSegment.advance_until_received",
     "CanSegment.send", "_ignore"};
 
@@ -1550,7 +1603,10 @@ PyInit__kernel(void)
     if (module == NULL)
         return NULL;
     fill_tables();
-    if ((empty_tuple = PyTuple_New(0)) == NULL EACH_NAME(INTERN) ||
+    PyObject *collections = PyImport_ImportModule("collections");
+    deque = collections == NULL ? NULL : PyObject_GetAttrString(collections, "deque");
+    Py_XDECREF(collections);
+    if (deque == NULL || (empty_tuple = PyTuple_New(0)) == NULL EACH_NAME(INTERN) ||
         (StationType = made(module, &Station_spec, station_fields)) == NULL ||
         (TimetableType = made(module, &Timetable_spec, timetable_fields)) == NULL ||
         (EndType = made(module, &End_spec, end_fields)) == NULL ||
