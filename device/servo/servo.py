@@ -409,7 +409,8 @@ class Servo(Readings):
         if run.heat is not self._heat:
             self._heat = run.heat
             self._limit_a = self._allowed_a(run.heat)
-        self._values = (*run.demand, 0.0)
+        position, velocity = run.demand
+        self._values = position, velocity, 0.0
 
     # time
 
@@ -462,7 +463,8 @@ class Servo(Readings):
 
     def _push(self, plant: Plant, loops: _Loops) -> int:
         """Apply the demand; return the direction in which it was cut."""
-        demand, (value, velocity, acceleration) = self._demand, self._values
+        demand = self._demand
+        value, velocity, acceleration = self._values  # not both at once: mypyc would iterate
         if demand is _Demand.NOTHING or self._off:
             loops.integral_a = 0.0
             plant.open()

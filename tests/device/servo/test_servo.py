@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from tests.device.servo.trapezoid import Trapezoid
 from tickrig.device.servo.parameters import EPOS_WHEEL, MOTOR_CORE_UNIT, PRESETS
-from tickrig.device.servo.readings import COPPER_PER_K
+from tickrig.device.servo.readings import COPPER_PER_K, nearest
 from tickrig.device.servo.servo import Servo
 
 SECOND_US = 1_000_000
@@ -290,3 +292,15 @@ def test_the_drive_measures_whole_numbers(servo: Servo) -> None:
     let(servo, 0.1)
     assert (servo.supply_mv, servo.current_ma) == (23_457, 1_235)
     assert servo.winding_dc == 250
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers(-99, 99).map(lambda n: n / 2))
+@example(0.49999999999999994)
+@example(-0.49999999999999994)
+@example(-0.5)
+@example(0.5)
+@example(1.5)
+@example(2.0**52 + 1)
+@example(-(2.0**53))
+def test_a_measurement_is_rounded_as_round_does(value: float) -> None:
+    assert nearest(value) == round(value)
