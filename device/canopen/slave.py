@@ -439,7 +439,7 @@ class CanopenSlave(Copyable):
             can_id: CAN-ID of 11 bits, 0x000..0x7FF.
             data: data of 0 to 8 bytes.
         """
-        self._out += (data_frame(can_id, data),)
+        self.put(data_frame(can_id, data))
 
     def put(self, frame: CanFrame) -> None:
         """Send an existing frame in this tick.
@@ -447,7 +447,8 @@ class CanopenSlave(Copyable):
         Args:
             frame: data frame to send.
         """
-        self._out += (frame,)
+        out = self._out  # mostly there is none; `+=` takes four times as long, 1 % of a network
+        self._out = (*out, frame) if out else (frame,)
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
         """Raise an error, which stays active until it is cleared.

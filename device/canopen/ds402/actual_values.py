@@ -37,7 +37,7 @@ def statusword_of(drive: Ds402) -> int:
     if limited:
         status |= _INTERNAL_LIMIT
     if state is DriveState.OPERATION_ENABLED:
-        status |= int(drive.mode.flags)
+        status |= drive.mode.flags
         if supervision.not_following and drive.mode.shows_following_error:
             status |= _FOLLOWING_ERROR
     return status

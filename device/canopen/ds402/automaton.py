@@ -140,21 +140,17 @@ class Automaton(Part):
             self._severe = severe
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
-    def run(self, operate: Callable[[int], bool], now_us: int) -> bool:
-        """Run one control period in the present state.
-
-        Args:
-            operate: function that runs one control period of the mode of operation.
-            now_us: present time in microseconds.
+    def run(self) -> bool:
+        """Run one control period in the present state, in which the mode is not active.
 
         Returns:
             True if the drive has no work until an input changes.
         """
+        if self._leaving is not None:
+            return self._leave(self._leaving)
         match self.state:
             case DriveState.NOT_READY_TO_SWITCH_ON:
                 self.enter(DriveState.SWITCH_ON_DISABLED)
-            case DriveState.OPERATION_ENABLED:
-                return operate(now_us) if self._leaving is None else self._leave(self._leaving)
             case DriveState.QUICK_STOP_ACTIVE:
                 return self._quick_stop()
             case DriveState.FAULT_REACTION_ACTIVE:
@@ -244,7 +240,8 @@ class Supervision(Part):
     def present(self, *, powered: bool) -> list[ErrorCode]:
         """Return the faults whose cause is present; a short circuit is detected only with power."""
         motor, bounds = self._axis.motor, self.bounds
-        supply_mv, (lowest_mv, highest_mv) = motor.supply_mv, bounds.supply_mv
+        supply_mv = motor.supply_mv
+        lowest_mv, highest_mv = bounds.supply_mv
         found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]
         if supply_mv < lowest_mv:
             found.append(ErrorCode.UNDER_VOLTAGE)

@@ -48,7 +48,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping
 from enum import IntEnum
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 
 from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
@@ -69,15 +69,12 @@ from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
 from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.device.canopen.ds402.trapezoid import RampShape
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
+from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.drive import Controlword, DriveState
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
-
-if TYPE_CHECKING:
-    from tickrig.device.servo.servo import Servo
-
 
 # Values that objects of a drive accept; others are refused with 0609 0030h (CiA 402-2).
 
@@ -348,7 +345,8 @@ class Ds402(Application):
         for code in self.supervision.step(now_us, powered=self.automaton.powered):
             self.fault(code)
         self._limited = False
-        settled = self.automaton.run(self._operate, now_us)
+        operating = self.automaton.operating  # no bound method is called, 1 % of a drive
+        settled = self._operate(now_us) if operating else self.automaton.run()
         if self.automaton.powered:
             self._axis.command()
         else:

@@ -55,11 +55,10 @@ class Stretch(Part):
         line = self._drive.mode.ahead() if servo.is_plain else None
         if line is None:
             return 0
-        axis, (first, last) = self._axis, self._axis.unwrapped
-        window, hottest_dc = (
-            axis.settings.following_error_window,
-            self._drive.supervision.bounds.winding_dc,
-        )
+        axis = self._axis
+        first, last = axis.unwrapped
+        window = axis.settings.following_error_window
+        hottest_dc = self._drive.supervision.bounds.winding_dc
         self._line, self._bounds = line, (first, last, window, axis.standstill, hottest_dc)
         run = servo.run_ahead(line, most, self._bounds)
         if run.steps < _FEWEST:

@@ -109,11 +109,11 @@ def _present(entry: Entry) -> bytes:
 
 
 def _join(entries: list[Entry]) -> bytes:
-    return b"".join(map(_data, entries))
+    return b"".join([entry.data for entry in entries])
 
 
 def _join_present(entries: list[Entry]) -> bytes:
-    return b"".join(map(_present, entries))
+    return b"".join([_present(entry) for entry in entries])
 
 
 def _split(steps: list[tuple[Unpack, int, int]], data: bytes) -> None:
@@ -187,7 +187,7 @@ def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
 
 
 class _MpdoQueue(TpdoMode):
-    """MPDOs in the order of events, with one frame per object and per inhibit time.
+    """MPDOs, in the order of events: one frame per object and per inhibit time.
 
     An event of an object whose frame is already waiting adds no frame. The frame is sent with the
     newest data.

@@ -7,15 +7,14 @@ from typing import ClassVar, Final
 
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.axis import STEP_S, Control, Ramp
-from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, ModeBit
 from tickrig.device.servo.servo import Line
-from tickrig.wire.canopen.drive import Statusword
 
 _STEP_US: Final = 1_000
 
 
 class _LatchedSetPoint(Mode):
-    """Follows a set-point that stays valid until another set-point is written.
+    """Follows a set-point that stays valid until another one is written.
 
     At the start the mode brakes, and the object of the set-point shows the reference. So nothing
     moves before the master writes a set-point.
@@ -91,7 +90,7 @@ class CyclicPosition(_LatchedSetPoint):
 
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
-        self.flags, self._left = Statusword.MODE_12, 0
+        self.flags, self._left = ModeBit.MODE_12, 0
         self._goal = self._ahead = 0.0
 
     def follow(self, now_us: int) -> bool:
@@ -166,10 +165,10 @@ class InterpolatedPosition(CyclicPosition):
     def run(self, now_us: int) -> bool:
         """Follow the line, or brake."""
         if not self._active:
-            self._left, self.flags = 0, Statusword(0)
+            self._left, self.flags = 0, 0
             return self.drive.stopping.brake(Ramp.SLOW_DOWN)
         settled = super().run(now_us)
-        self.flags = Statusword.MODE_12 | (Statusword.TARGET_REACHED if settled else 0)
+        self.flags = ModeBit.MODE_12 | (ModeBit.TARGET_REACHED if settled else 0)
         return settled
 
     def ahead(self) -> Line | None:
@@ -178,7 +177,7 @@ class InterpolatedPosition(CyclicPosition):
 
     def halt(self, now_us: int) -> bool:
         """Brake according to 605Dh; the next record begins a line."""
-        self._left, self.flags = 0, self.flags & ~Statusword.MODE_12
+        self._left, self.flags = 0, self.flags & ~ModeBit.MODE_12
         return super().halt(now_us)
 
 
@@ -218,7 +217,7 @@ class CyclicVelocity(Mode):
             min(self._slope, settings.max_acceleration),
             min(self._slope, settings.max_deceleration),
         )
-        self.flags = Statusword.MODE_12
+        self.flags = ModeBit.MODE_12
         return reached
 
 
@@ -232,7 +231,7 @@ SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
 
 
 class _PositionSetting(_LatchedSetPoint):
-    """Position mode, -1, which moves to 2062h, in position units.
+    """Position mode, -1: moves to 2062h, in position units.
 
     Bit 8 of the controlword has no effect in these modes (DECISION K21).
     """

@@ -6,10 +6,9 @@ from enum import Enum, IntFlag, auto
 from typing import Final, NamedTuple
 
 from tickrig.device.canopen.ds402 import indices, trapezoid
-from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, ModeBit
 from tickrig.device.canopen.ds402.modes.profile_position import SLOWEST, STEEPEST
 from tickrig.device.twin import Part
-from tickrig.wire.canopen.drive import Statusword
 
 # The search for home: a table of the methods, and the direction by the switches (CiA 402-2).
 
@@ -188,10 +187,10 @@ class _Stage(Enum):
 
 
 _FLAGS: Final = {
-    _Stage.IDLE: Statusword(0),
-    _Stage.SEARCHING: Statusword(0),
-    _Stage.ATTAINED: Statusword.MODE_12,
-    _Stage.FAILED: Statusword.MODE_13,
+    _Stage.IDLE: 0,
+    _Stage.SEARCHING: 0,
+    _Stage.ATTAINED: ModeBit.MODE_12,
+    _Stage.FAILED: ModeBit.MODE_13,
 }
 
 
@@ -258,7 +257,7 @@ class Homing(Mode):
         ended = self._path.follow(now_us) and self._search is None
         self.flags = _FLAGS[self._stage]
         if ended and self.axis.stands:
-            self.flags |= Statusword.TARGET_REACHED
+            self.flags |= ModeBit.TARGET_REACHED
         return ended
 
     def _end(self, stage: _Stage) -> None:

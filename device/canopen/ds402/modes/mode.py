@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar
 
 from tickrig.device.canopen.ds402 import indices
@@ -13,6 +14,17 @@ from tickrig.wire.canopen.drive import Controlword, Statusword
 
 if TYPE_CHECKING:
     from tickrig.device.servo.servo import Line
+
+
+class ModeBit(IntEnum):
+    """Bits of the statusword that a mode sets.
+
+    Operators of an `IntEnum` are those of `int`; of a flag they take 20 times as long.
+    """
+
+    TARGET_REACHED = Statusword.TARGET_REACHED
+    MODE_12 = Statusword.MODE_12
+    MODE_13 = Statusword.MODE_13
 
 
 @dataclass(slots=True, kw_only=True)
@@ -64,13 +76,17 @@ class Mode(Part):
 
     def __init__(self, drive: DriveView) -> None:
         self.drive, self.axis, self.reference = drive, drive.axis, drive.axis.reference
-        self.number = drive.parameters.number
-        self.flags, self.limited = Statusword(0), False
+        self._parameters = drive.parameters
+        self.flags, self.limited = 0, False
 
     @property
     def settings(self) -> Settings:
         """The present configuration."""
         return self.axis.settings
+
+    def number(self, index: int, sub: int = 0) -> int:
+        """Return the value of an object; see `Parameters.number`."""
+        return self._parameters.number(index, sub)
 
     def enter(self, *, enabled: bool) -> None:
         """Start the mode.
@@ -115,9 +131,9 @@ class Mode(Part):
     def halt(self, now_us: int) -> bool:
         """Brake according to 605Dh; see `step`."""
         stands = self.drive.stopping.by(indices.HALT_OPTION)
-        self.flags &= ~Statusword.TARGET_REACHED
+        self.flags &= ~ModeBit.TARGET_REACHED
         if stands:
-            self.flags |= Statusword.TARGET_REACHED
+            self.flags |= ModeBit.TARGET_REACHED
         return stands
 
     def take(self, demand: Clamped) -> float:

@@ -13,9 +13,8 @@ from tickrig.device.canopen.ds402.modes.cyclic import (
     InterpolatedPosition,
 )
 from tickrig.device.canopen.ds402.modes.homing import Homing
-from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, ModeBit, Window
 from tickrig.device.canopen.ds402.modes.profile_position import ProfilePosition
-from tickrig.wire.canopen.drive import Statusword
 
 # Profile velocity, profile torque and cyclic synchronous torque mode (CiA 402-2).
 
@@ -56,11 +55,11 @@ class _ProfileVelocity(Mode):
         near = abs(actual - wanted) <= window if window else ended
         threshold = settings.velocity_threshold
         slow = abs(actual) <= threshold if threshold else self.reference.velocity == 0
-        flags = Statusword(0)
+        flags = 0
         if self._arrived.holds(now_us, near, settings.velocity_window_us):
-            flags |= Statusword.TARGET_REACHED
+            flags |= ModeBit.TARGET_REACHED
         if self._slow.holds(now_us, slow, settings.velocity_threshold_us):
-            flags |= Statusword.MODE_12
+            flags |= ModeBit.MODE_12
         self.flags = flags
 
 
@@ -87,10 +86,10 @@ class _ProfileTorque(Mode):
         reference, most = self.reference, self.settings.torque_slope_a_s * STEP_S
         away = wanted_a - reference.current_a
         if abs(away) <= most:
-            reference.current_a, self.flags = wanted_a, Statusword.TARGET_REACHED
+            reference.current_a, self.flags = wanted_a, ModeBit.TARGET_REACHED
             return True
         reference.current_a += most if away > 0 else -most
-        self.flags = Statusword(0)
+        self.flags = 0
         return False
 
 
@@ -114,7 +113,7 @@ class _CyclicTorque(Mode):
     def run(self, now_us: int) -> bool:
         """Apply the target torque."""
         self.reference.current_a = self.target_current(self.number(indices.TORQUE_OFFSET))
-        self.flags = Statusword.MODE_12
+        self.flags = ModeBit.MODE_12
         return True
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from tickrig.device.canopen.ds402 import indices, trapezoid
-from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, ModeBit, Window
 from tickrig.device.canopen.ds402.settings import Settings
 from tickrig.device.twin import Immutable
-from tickrig.wire.canopen.drive import Controlword, Statusword
+from tickrig.wire.canopen.drive import Controlword
 
 SLOWEST: Final = 1.0
 """Lowest velocity in counts per second, so that each profile ends."""
@@ -135,15 +135,15 @@ class ProfilePosition(Mode):
         passed = point is not None and point.end_velocity > 0
         near = self._arrived and (passed or away <= settings.position_window)
         reached = self._near.holds(now_us, near, settings.position_window_us)
-        self.flags = Statusword.TARGET_REACHED if reached else Statusword(0)
+        self.flags = ModeBit.TARGET_REACHED if reached else 0
         self.limited |= point is not None and point.cut
         self._acknowledge()
 
     def _acknowledge(self) -> None:
         """Set or clear bit 12."""
-        self.flags &= ~Statusword.MODE_12
+        self.flags &= ~ModeBit.MODE_12
         if self._acknowledges or self._waiting:
-            self.flags |= Statusword.MODE_12
+            self.flags |= ModeBit.MODE_12
 
 
 def _profile_limits(

@@ -45,3 +45,23 @@ def test_an_owner_judges_a_value_before_it_is_there() -> None:
     with pytest.raises(SdoAbort, match="LOCAL_CONTROL"):
         entry.check_owner(b"\x07")
     assert entry.value == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "number"),
+    [
+        (DataType.INTEGER32, "FFFFFF7F", 0x7FFF_FFFF),
+        (DataType.INTEGER32, "00000080", -0x8000_0000),
+        (DataType.INTEGER32, "FEFFFFFF", -2),
+        (DataType.UNSIGNED32, "FEFFFFFF", 0xFFFF_FFFE),
+        (DataType.UNSIGNED32, "01020304", 0x0403_0201),
+        (DataType.INTEGER16, "FEFF", -2),
+        (DataType.UNSIGNED64, "FEFFFFFFFFFFFFFF", 0xFFFF_FFFF_FFFF_FFFE),
+    ],
+)
+def test_the_number_of_an_entry_has_the_sign_of_its_type(
+    kind: DataType, data: str, number: int
+) -> None:
+    entry = Dictionary([EntryDescription(0x2000, 0, "x", kind, Access.READ)])[0x2000, 0]
+    entry.assign(bytes.fromhex(data))
+    assert entry.number == number == entry.value
