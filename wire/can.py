@@ -143,11 +143,12 @@ class CanFrame(NamedTuple):
 
 
 def data_frame(can_id: int, data: bytes) -> CanFrame:
-    """Return `CanFrame(can_id, data)` with an 11-bit identifier in a third of the time."""
-    return _new(CanFrame, (can_id, data, False, False, 0))
+    """Return `CanFrame(can_id, data)` in a third of the time: 11-bit, not validated."""
+    return _new(_FRAME, (can_id, data, False, False, 0))
 
 
 _new: Final = tuple.__new__
+_FRAME: Final = CanFrame  # mypyc finds it without a look-up
 
 Frames = tuple[CanFrame, ...]
 """The traffic of one tick on a CAN bus."""

@@ -124,10 +124,11 @@ class Service(Copyable):
             this time.
     """
 
-    __slots__ = ("asked_us", "node", "slot")
+    __slots__ = ("_asks", "asked_us", "node", "slot")
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         self.node, self.slot, self.asked_us = node, slot, NEVER
+        self._asks = False  # whether it has ever asked for a tick
 
     @classmethod
     def of(cls, node: CanopenSlave) -> Self:
@@ -513,7 +514,8 @@ class CanopenSlave(Copyable):
             due_us: time of the call, or `NEVER` for no call.
         """
         before, service.asked_us = service.asked_us, due_us
-        if due_us < NEVER and service not in self._asking:
+        if due_us < NEVER and not service._asks:
+            service._asks = True
             self._asking = tuple(sorted((*self._asking, service), key=_slot))
         if due_us < self.due_us:
             self.due_us = due_us

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from operator import attrgetter
-from typing import ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort, whole_number
-from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, PdoSender, TpdoMode
+from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, TpdoMode
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Part
 from tickrig.wire.canopen import pdo
@@ -17,6 +17,9 @@ from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.pdo.tpdo import Tpdo
 
 # Conversion between mapped entries and the bytes of a PDO, prepared once per mapping.
 
@@ -195,7 +198,7 @@ class _MpdoQueue(TpdoMode):
 
     timed: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender, node_id: int = 0) -> None:
+    def __init__(self, sender: Tpdo, node_id: int = 0) -> None:
         super().__init__(sender)
         self._node_id = node_id
         self._inhibit_us, self._free_us = sender.parameters.inhibit_us, 0

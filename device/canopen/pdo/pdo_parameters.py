@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar, Final, Protocol
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig.device.canopen.dictionary import Dictionary, Entry, OnEntry, SdoAbort, whole_number
 from tickrig.device.twin import Part
@@ -11,6 +11,9 @@ from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.pdo.tpdo import Tpdo
 
 # PDO communication parameter, 1400h.. and 1800h.. (CiA 301, PDO communication parameter).
 
@@ -132,25 +135,6 @@ class PdoParameters(Part):
 # Behaviour of the transmission types of TPDOs (CiA 301, transmission type).
 
 
-class PdoSender(Protocol):
-    """The interface of a TPDO to its mode."""
-
-    @property
-    def parameters(self) -> PdoParameters:
-        """Transmission type, inhibit time and event timer."""
-        ...
-
-    def pack(self) -> bytes:
-        """Return the mapped objects as bytes."""
-        ...
-
-    def send(self, data: bytes | None = None) -> None:
-        """Send bytes, or the present values of the mapped objects."""
-
-    def wake(self, due_us: int) -> None:
-        """Schedule a run of the mode at a time or earlier."""
-
-
 class TpdoMode(Part):
     """Base of transmission types: a TPDO that is sent only on a remote frame.
 
@@ -169,7 +153,7 @@ class TpdoMode(Part):
     timed: ClassVar[bool] = False
     on_change: ClassVar[bool] = False
 
-    def __init__(self, sender: PdoSender) -> None:
+    def __init__(self, sender: Tpdo) -> None:
         self.sender, self.due_us = sender, NEVER
         self.on_sync: Callable[[int], None] = _ignore
 
@@ -200,7 +184,7 @@ class SynchronousAcyclic(TpdoMode):
     synchronous: ClassVar[bool] = True
     on_change: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender) -> None:
+    def __init__(self, sender: Tpdo) -> None:
         super().__init__(sender)
         self._marked = True
         self.on_sync = self._send_if_marked
@@ -226,7 +210,7 @@ class SynchronousCyclic(TpdoMode):
 
     synchronous: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender) -> None:
+    def __init__(self, sender: Tpdo) -> None:
         super().__init__(sender)
         self._period = self._left = sender.parameters.transmission_type
         self._start = sender.parameters.sync_start
@@ -259,7 +243,7 @@ class RtrSynchronous(TpdoMode):
 
     synchronous: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender) -> None:
+    def __init__(self, sender: Tpdo) -> None:
         super().__init__(sender)
         self._sample = sender.pack()
         self.on_sync = self._take
@@ -282,7 +266,7 @@ class EventDriven(TpdoMode):
     timed: ClassVar[bool] = True
     on_change: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender) -> None:
+    def __init__(self, sender: Tpdo) -> None:
         super().__init__(sender)
         self._inhibit_us = sender.parameters.inhibit_us
         self._marked, self._retimed, self._free_us, self.due_us = True, False, 0, 0

@@ -285,7 +285,7 @@ class PdoProducer(Service):
 
     def _sync(self, counter: int) -> None:
         if self._synchronous:
-            self._counters += (counter,)
+            self._counters = (*self._counters, counter) if self._counters else (counter,)
             self.wake(self.node.now_us)
 
     def _collect(self) -> None:

@@ -23,7 +23,6 @@ from tickrig.device.canopen.parameter_store import STORE_PARAMETERS, ParameterSt
 from tickrig.device.canopen.pdo.pdo_mapping import Pack, total_bits
 from tickrig.device.canopen.pdo.pdo_parameters import (
     EventDriven,
-    PdoSender,
     SynchronousAcyclic,
     SynchronousCyclic,
     TpdoMode,
@@ -376,7 +375,7 @@ class TimedCyclic(SynchronousCyclic):
 
     timed: ClassVar[bool] = True
 
-    def __init__(self, sender: PdoSender, now_us: int) -> None:
+    def __init__(self, sender: Tpdo, now_us: int) -> None:
         super().__init__(sender)
         self.retime(now_us)
 
