@@ -187,8 +187,9 @@ class Axis(Part):
 
     def __init__(self, motor: Motor, settings: Settings) -> None:
         self.motor: Motor = motor
-        self.settings = settings
-        self.reference, self.control = Reference(), Control.POSITION
+        self.settings: Settings = settings
+        self.reference: Reference = Reference()
+        self.control = Control.POSITION
         self.zero, self.homed = 0.0, False
         self.standstill = _STANDSTILL_TURNS_S * motor.counts_per_turn
 
@@ -392,7 +393,7 @@ class Switches(Part):
     """
 
     def __init__(self) -> None:
-        self.word = 0
+        self.word: int = 0
         self._hand = 0
         self._angles = (-inf, inf, inf, -inf)
         self.by_angle = False
