@@ -44,7 +44,10 @@ class Reference(Part):
     __slots__ = ("acceleration", "current_a", "position", "velocity")
 
     def __init__(self) -> None:
-        self.position = self.velocity = self.acceleration = self.current_a = 0.0
+        self.position: float = 0.0
+        self.velocity: float = 0.0
+        self.acceleration: float = 0.0
+        self.current_a: float = 0.0
 
     def ramp(self, velocity: float, acceleration: float, deceleration: float) -> bool:
         """Make a step towards a velocity; return whether it is reached.
