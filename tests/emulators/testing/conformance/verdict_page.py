@@ -25,19 +25,20 @@ SHOWN: Final = (
 )
 HEAD: Final = """# Verdicts on CANopen stacks
 
-What [`canmon conform --intrusive`](conform.md) says of our slaves and of two foreign stacks, in
-virtual time. The page is written by `tools/conform-stacks`; the same versions give the same page.
+What [`canmon conform --intrusive`](conform.md) reports about our slaves and two foreign stacks, in
+virtual time. `tools/conform-stacks` writes this page. The same versions give the same page.
 
-A verdict is on a slave as it was put together for this page: the objects are those of the
-reference dictionary R1 for which the stack has something, the application moves inputs and raises
-errors as the stack lets it, and does no more. What a stack leaves to the application, such as
-values after a reset, is a failure here, and need not be one in a device.
+A verdict is about a slave as it was built for this page. Its objects are the objects of the
+reference dictionary R1 that the stack supports. The application moves inputs and raises errors as
+far as the stack allows it, and does nothing else. A stack leaves some behaviour to the application,
+such as the values after a reset. Such behaviour fails here, but it may pass for a device with the
+same stack.
 
 """
 BY_HAND: Final = """## CANopenNode and Lely
 
-They are written in C and come by no registry of Python packages: their verdicts are
-[by hand](conformance-by-hand.md).
+CANopenNode and Lely are written in C, and are not in a registry of Python packages. We compared
+their verdicts [by hand](conformance-by-hand.md).
 """
 MOST: Final = 160
 """Characters of what came: what else had been allowed is in a run of one's own."""
@@ -95,11 +96,12 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     found = compare(report, read_table(stack))
     yield f"## {name}\n"
     yield (
-        f"For {len(read_table(stack)) - 1} of the checks there are verdicts of another tester:"
-        f" {found.both} were judged here and there, {found.same} verdicts are the same."
+        f"Another tester has verdicts for {len(read_table(stack)) - 1} of the checks."
+        f" Both testers judged {found.both} checks; {found.same} of these verdicts are the same."
     )
     for one in found.differences:
-        yield f"{one.check_id} differs: {one.public} there, {one.here} here: {one.reason}."
+        why = f" ({one.reason})" if one.reason else ""
+        yield f"{one.check_id} differs: the other tester has {one.public}, we have {one.here}{why}."
     failed = [one for one in report.results if one.outcome.verdict is CheckVerdict.FAIL]
     yield "\n| check | clause | what came |\n|---|---|---|"
     for result in failed:
@@ -124,7 +126,7 @@ def _objects(failed: list[Result]) -> Iterator[str]:
     for result in failed:
         kinds.setdefault(result.check.id.rsplit("-", 1)[1], []).append(result)
     if kinds:
-        yield "\nChecks of each object that failed, one of a kind:\n"
+        yield "\nFailed checks of objects, with one example of each kind:\n"
         yield "| kind | failed | example | what came |\n|---|---|---|---|"
     for kind, results in sorted(kinds.items()):
         example = results[0]

@@ -18,10 +18,10 @@ WORDS: Final = {
 """What the public checks call a verdict; where the device decides they said FAIL, and (impl)."""
 
 REASONS: Final[Mapping[tuple[str, str], str]] = {
-    ("LocalNode", "SG-01"): "a fresh LocalNode cannot abort, as it has no object yet to name; here"
-    " it was asked for others before",
-    ("LocalNode", "DS-08"): "it refuses a download in segments when all has come, which CiA 301"
-    " allows",
+    ("LocalNode", "SG-01"): "a fresh LocalNode cannot abort, because it has no object to name in"
+    " the abort; our tester had requested other objects before",
+    ("LocalNode", "DS-08"): "LocalNode refuses a download in segments after the last segment, which"
+    " CiA 301 allows",
 }
 """Why a verdict differs."""
 
