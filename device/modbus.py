@@ -98,7 +98,9 @@ class Registers(Part):
         return [values[name] >> shift & 0xFFFF for name, shift in self._places]
 
     def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
-        """Write registers, all or none; return the written numbers by name.
+        """Write registers; return the numbers that were written, by their names.
+
+        If a register is refused, none is written.
 
         Raises:
             Refusal: a register does not exist or is read-only, only half of a number would be

@@ -279,8 +279,9 @@ def free_speed_rad_s(servo: ServoParameters) -> float:
 def of_size(servo: ServoParameters, size: float) -> ServoParameters:
     """Return the parameters of several equal servos on one shaft.
 
-    Currents, torques, inertias and friction grow in proportion to the size. Electrical and thermal
-    resistances fall with it. Speeds, voltages, temperatures and all time constants stay the same.
+    Currents, torques, inertias and friction are multiplied by the number of servos. Electrical and
+    thermal resistances are divided by it. Speeds, voltages, temperatures and all time constants
+    stay the same.
 
     Args:
         servo: the parameters of one servo.

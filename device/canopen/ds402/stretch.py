@@ -44,7 +44,8 @@ class Stretch(Part):
 
         Args:
             now_us: time of the present tick.
-            requested: whether the present tick was requested, not due by schedule.
+            requested: whether a frame or an input requested the present tick. A tick that is not
+                requested was due by the schedule.
 
         Returns:
             The duration of the computed ticks in microseconds.

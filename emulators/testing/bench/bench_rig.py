@@ -403,7 +403,7 @@ class BenchDescription:
         name: name of the device or bench.
         inputs: all inputs, including buttons and physical faults.
         groups: inputs that are set together.
-        outputs: outputs that are not inputs.
+        outputs: names of the outputs. A signal that is also an input is only in `inputs`.
         faults: physical faults, and faults of the wire.
     """
 

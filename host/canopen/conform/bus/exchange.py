@@ -328,7 +328,7 @@ class BusExchange:
     def presence(self) -> Presence:
         """Number of nodes that have answered.
 
-        Two nodes answered if most objects were answered twice.
+        If most requests got two answers, two nodes have answered.
         """
         if self._is_silent:
             return Presence.NONE
