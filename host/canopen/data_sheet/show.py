@@ -167,7 +167,7 @@ def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
-    """Return a table as lines of text. The first line is the header; the last column is not padded."""
+    """Return a table as lines of text, the header first. The last column is not padded."""
     lines = [[str(row[column]) for column in columns] for row in rows]
     all_lines = [list(columns), *lines]
     widths = [max(len(line[at]) for line in all_lines) for at in range(len(columns))]
