@@ -9,3 +9,20 @@ NEVER: Final = 2**62 - 1
 
 It is the largest int that compiled code stores without an object, which makes drives 5 % faster.
 """
+
+
+def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
+    """Return the first tick after an instant that is not before another one.
+
+    Args:
+        now_us: the instant that the tick follows.
+        due_us: the earliest time of the tick, which may be `NEVER`.
+        tick_us: ticks are at multiples of it.
+
+    >>> next_tick_us(1_000, 0, 1_000), next_tick_us(1_000, 2_500, 1_000)
+    (2000, 3000)
+    """
+    first_us = now_us - now_us % tick_us + tick_us
+    if due_us <= first_us:
+        return first_us
+    return -(-due_us // tick_us) * tick_us

@@ -144,7 +144,8 @@ class LoadAccount:
         # The account is settled after ten idle periods in a row. Until then `load_pct`, a mean of
         # the last ten periods, still changes without traffic, so each tick must run.
         self._costs_pct = (*self._costs_pct[1:], cost_pct)
-        self.settled = not self.backlog_pct and self._costs_pct == (idle_pct,) * _SHOWN_PERIODS
+        idle = cost_pct == idle_pct and not self.backlog_pct
+        self.settled = idle and self._costs_pct.count(idle_pct) == _SHOWN_PERIODS
 
 
 # The RRC's buzzer: patterns of the host, and the automatic alarm below them.
@@ -253,6 +254,11 @@ class PowerSequence:
         if self._since is None:
             return _NOTHING
         return self._waiting(state, tick - self._since, inputs)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a fault is present and time decides what it does."""
+        return bool(self._faults)
 
     def due_tick(self, state: RrcState) -> int:
         """Return the next tick at which something happens without input."""

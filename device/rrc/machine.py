@@ -26,7 +26,7 @@ from tickrig.wire.rrc.message import (
     pace_lines_s,
     strip_check,
 )
-from tickrig.wire.rrc.replies import StatusA as Status
+from tickrig.wire.rrc.replies import StatusA
 
 # Theory of operation
 # ===================
@@ -68,6 +68,8 @@ from tickrig.wire.rrc.replies import StatusA as Status
 # - Costs are charged where the bytes come in, not where lines are obeyed (R27): `rx.count` counts
 #   each LF that arrives, even one that an overflow discards. `_replies` counts lines that answer a
 #   line, so EV, SA and overflow lines must not go through `_reply`.
+# - `_quiet` says that `_read_inputs` did nothing and would do nothing again: VR2 runs, no fault is
+#   being timed, and no state has changed since. Then only a changed input makes it run.
 # - `_next_due` must include every tick in which anything changes without traffic. A rig in virtual
 #   time skips all others: a timer that is missing from `_next_due` works in real time and fails in
 #   virtual time. While SA lines run or the load account drains, each tick is due.
@@ -164,6 +166,9 @@ _MOVES: Final[dict[type[cmd.Command], Move]] = {
     cmd.PowerOff: Move.FORCED,
 }
 
+_STAYS: Final = ((Move.OUTPUT, RrcState.OUTPUT), (Move.LIMIT, RrcState.LIMIT))
+"""Transitions of `NEXT_STATE` that change nothing."""
+
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 @dataclass(slots=True)
@@ -194,6 +199,7 @@ class Rrc(Copyable):
     _load: LoadAccount = field(init=False)
     _renewed: int = field(default=0, init=False)  # tick of the latest correct command
     _moved: int = field(default=0, init=False)  # tick of the latest transition
+    _quiet: bool = field(default=False, init=False)  # same inputs: `_read_inputs` does nothing
     _due_us: int = field(init=False)
     _sent: list[bytes] = field(default_factory=list, init=False)
     _commands: int = field(default=0, init=False)
@@ -231,7 +237,7 @@ class Rrc(Copyable):
 
     def _lose_power(self) -> None:
         """Reset the state that a power cut of the RRC erases; the vehicle keeps rolling."""
-        self.state = RrcState.OFF
+        self.state, self._quiet = RrcState.OFF, False
         self._buffer = ReceiveBuffer(self.config.buffer_bytes)
         self._power, self._load = PowerSequence(self.config), LoadAccount()
         self._wipe()
@@ -267,9 +273,10 @@ class Rrc(Copyable):
         Returns:
             The bytes that the RRC sends in this tick.
         """
-        tick = now_us // TICK_US
-        self.inputs.changed = False
-        if not self.inputs["rrc_power"]:
+        tick, inputs = now_us // TICK_US, self.inputs
+        looks = inputs.changed or not self._quiet
+        inputs.changed = False
+        if looks and not inputs["rrc_power"]:
             self._lose_power()
             self._roll()
             self._due_us = now_us + TICK_US if self._rolls else NEVER
@@ -279,10 +286,11 @@ class Rrc(Copyable):
         self._sent, self._commands, self._replies = [], 0, 0
         # The order from here on is R28; see the top of this file.
         overflows = self._receive(rx) if rx else 0
-        self._read_inputs(tick)
+        if looks:
+            self._read_inputs(tick)
         self._work(tick)
         self._watch(tick)
-        self._drive.step(tick, self.state, self._settings, self.inputs)
+        self._drive.step(tick, self.state, self._settings, inputs)
         self._roll()
         self._report_and_account(tick, rx.count(b"\n"), overflows)
         running = self.state in POWERED_ON
@@ -313,6 +321,7 @@ class Rrc(Copyable):
             self._sent.append(replies.Event(event).encode())
         if move is not None:
             self._move(move, tick)
+        self._quiet = self.state in POWERED_ON and move is None and not self._power.waiting
 
     def _choose_drive(self) -> None:
         """Set the reverse mode in Standby by the held buttons (DECISION R8)."""
@@ -410,7 +419,7 @@ class Rrc(Copyable):
         load, status = self._load, self._settings.status
         if self.state in POWERED_ON:
             if status:
-                self._sent.append(self._status().encode())
+                self._sent.append(self._status())
             extra_pct = self.inputs["extra_load_pct"]
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
@@ -419,17 +428,14 @@ class Rrc(Copyable):
                 # them now, not one tick later.
                 self._drive.step(tick, self.state, self._settings, self.inputs)  # motors stop
 
-    def _status(self) -> Status:
-        settings, inputs = self._settings, self.inputs
-        return Status(
-            inputs["stick_v_pct"],
-            inputs["stick_w_pct"],
-            *self._drive.out_pct,
+    def _status(self) -> bytes:
+        now, inputs = self._settings, self.inputs
+        return StatusA.line(
+            (inputs["stick_v_pct"], inputs["stick_w_pct"]),
+            self._drive.out_pct,
             self._vehicle.shown_gauge if self.config.vehicle else inputs["gauge"],
-            settings.speed_mode,
-            settings.speed_up_count,
-            settings.speed_down_count,
-            settings.alarm_count,
+            now.speed_mode,
+            (now.speed_up_count, now.speed_down_count, now.alarm_count),
         )
 
     def _reply(self, reply: replies.Ok | replies.Refusal | replies.Text) -> None:
@@ -438,6 +444,10 @@ class Rrc(Copyable):
 
     def _move(self, move: Move, tick: int) -> bool:
         """Change the state; return False if the transition does not exist."""
+        if (move, self.state) in _STAYS:  # most commands of a host that drives
+            self._moved = tick
+            return True
+        self._quiet = False
         state = NEXT_STATE.get((self.state, move))
         if state is None:
             return False

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, Final, Generic
 from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.rig.station import next_tick_us
 from tickrig.host.text import bench_header, notebook, trace
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
 from tickrig.host.text.values import format_time
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.instant import NEVER
+from tickrig.wire.instant import NEVER, next_tick_us
 
 if TYPE_CHECKING:
     import pandas

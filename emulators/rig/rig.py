@@ -59,9 +59,8 @@ from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
-from tickrig.emulators.rig.sim_waits import HostLimit
-from tickrig.emulators.rig.station import Station, Timetable, is_wire_port, next_tick_us
-from tickrig.wire.instant import NEVER
+from tickrig.emulators.rig.station import Station, Timetable, is_wire_port
+from tickrig.wire.instant import NEVER, next_tick_us
 
 # Connections of devices besides their wires.
 
@@ -506,7 +505,9 @@ class Rig(Copyable):
             next_us = min(next_us, bridge.due_us)
         if self._jumps:
             for station in self._looked_at:
-                next_us = min(next_us, station.wake_us(now_us))
+                due_us = min(station.device.due_us, station.port.due_us)
+                if due_us < next_us:
+                    next_us = min(next_us, next_tick_us(now_us, due_us, station.tick_us))
             for coupling in self._couplings:
                 if (due_us := coupling.due_us) < next_us:
                     next_us = min(next_us, next_tick_us(now_us, due_us, coupling.tick_us))

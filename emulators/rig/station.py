@@ -10,7 +10,7 @@ from tickrig.device.core import Device, W
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.kernel import StationFields, TimetableFields, in_kernel
 from tickrig.emulators.rig.port import Port, Wire
-from tickrig.wire.instant import NEVER
+from tickrig.wire.instant import NEVER, next_tick_us
 from tickrig.wire.uart import UartSetting
 
 # Ports of shared wires; the rig asks at run time which ones are.
@@ -95,14 +95,6 @@ class _UartPort(Copyable, Generic[W]):
         if setting is not None and setting != self._setting:
             self._setting = setting
             self._port.use_uart(now_us, setting)
-
-
-def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
-    """Return the first tick after `now_us` that is not before `due_us`, which may be `NEVER`."""
-    first_us = now_us - now_us % tick_us + tick_us
-    if due_us <= first_us:
-        return first_us
-    return -(-due_us // tick_us) * tick_us
 
 
 # Timetable of ticks with work.

@@ -237,8 +237,9 @@ class _Direction(Part):
         busy = bool(self._bursts) and now_us < self.last_us
         start_us = self.last_us if busy else now_us
         timing = self._next if start_us >= self._from_us else self._timing
-        if busy and self._bursts[-1].timing == timing:
-            self._bursts[-1].data += accepted
+        last = self._bursts[-1] if busy else None
+        if last is not None and (last.timing is timing or last.timing == timing):
+            last.data += accepted
         else:
             self._bursts.append(_Burst(start_us, accepted, timing))
         self._note_due()
@@ -246,25 +247,32 @@ class _Direction(Part):
     def take(self, now_us: int) -> bytes:
         if now_us < self.first_us:
             return b""
+        if now_us >= self.last_us:
+            data = self.coming
+            self._bursts.clear()
+        else:
+            data = self._take_arrived(now_us)
+        self._held -= len(data)
+        self._note_due()
+        self.lost += max(0, len(data) - self._buffer_bytes)
+        return data[: self._buffer_bytes]
+
+    def _take_arrived(self, now_us: int) -> bytes:
+        """Take the bytes that have arrived while others are in transit."""
         taken = []
-        while self._bursts:
+        while True:
             burst = self._bursts[0]
             arrived = burst.arrived(now_us)
             taken.append(burst.data[burst.taken : arrived])
             burst.taken = arrived
             if arrived < len(burst.data):
                 burst.forget_taken()
-                break
+                return b"".join(taken)
             self._bursts.popleft()
-        data = b"".join(taken)
-        self._held -= len(data)
-        self._note_due()
-        self.lost += max(0, len(data) - self._buffer_bytes)
-        return data[: self._buffer_bytes]
 
     @property
     def coming(self) -> bytes:
-        return b"".join(burst.data[burst.taken :] for burst in self._bursts)
+        return b"".join([burst.data[burst.taken :] for burst in self._bursts])
 
     def arrival_us(self, count: int) -> int:
         for burst in self._bursts:

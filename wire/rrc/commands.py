@@ -327,9 +327,52 @@ def parse_command(message: bytes) -> Command:
     match = _NAME.match(message)
     if match is None:
         raise UnknownCommand(f"{message!r} is not one of {', '.join(n.decode() for n in COMMANDS)}")
-    kind = COMMANDS[match[0]]
-    values = _read_parameters(kind, message[match.end() :])
+    name = match[0]
+    size, fields = _PLACES.get(name, _NOWHERE)
+    if size == len(message):
+        command = _read_fields(COMMANDS[name], fields, message)
+        if command is not None:
+            return command
+    kind = COMMANDS[name]
+    values = _read_parameters(kind, message[len(name) :])
     return Beep(values) if kind is Beep else kind(*values)
+
+
+# The short way of a line without a fault: its values are those of a table, so no check is repeated.
+
+_Field = tuple[str, int, int, dict[bytes, int]]
+
+
+def _fields_of(kind: type[Command]) -> tuple[_Field, ...]:
+    """Return name, begin, end and values of each parameter of a kind."""
+    names: tuple[str, ...] = kind.__match_args__
+    fields, at = list[_Field](), len(kind.name)
+    for name, parameter in zip(names, kind.parameters, strict=True):
+        fields.append((name, at, at + parameter.width, parameter.values))
+        at += parameter.width
+    return tuple(fields)
+
+
+_PLACES: Final = {
+    kind.name: (len(kind.name) + kind.size, _fields_of(kind))
+    for kind in COMMANDS.values()
+    if kind not in (Beep, Joystick, Status)  # they have more than independent numbers
+}
+"""The length of the line and its parameters, by name."""
+
+_NOWHERE: Final[tuple[int, tuple[_Field, ...]]] = (0, ())
+_new, _set = object.__new__, object.__setattr__
+
+
+def _read_fields(kind: type[Command], fields: tuple[_Field, ...], message: bytes) -> Command | None:
+    """Return a command of this kind, None if a parameter is no value of its table."""
+    command = _new(kind)
+    for name, begin, end, values in fields:
+        value = values.get(message[begin:end])
+        if value is None:
+            return None
+        _set(command, name, value)
+    return command
 
 
 def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:

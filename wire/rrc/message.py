@@ -10,7 +10,7 @@ from tickrig.wire.errors import ChecksumError, FieldError
 # Numbers as the RRC writes them: `2hex` and `1hex`, negative ones in two's complement.
 
 _UPPER_DIGITS: Final = tuple(b"%X" % n for n in range(16))
-_HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcdef")
+_HEX_DIGITS: Final = {bytes([code]): int(chr(code), 16) for code in b"0123456789ABCDEFabcdef"}
 
 
 def all_digits(width: int) -> list[bytes]:
@@ -64,7 +64,8 @@ def strip_check(line: bytes) -> bytes:
     # The last character is always taken as CHECK. So a line without CHECK loses its last digit here
     # and is refused because of a wrong CHECK (vector C02).
     message, digit = line[:-1], line[-1:]
-    if digit not in _HEX_DIGITS or int(digit, 16) != sum(message) & 0xF:
+    total: int = sum(message)
+    if _HEX_DIGITS.get(digit) != total & 0xF:
         raise ChecksumError(f"CHECK {digit!r} of {line!r}, expected {check_digit(message)!r}")
     return message
 

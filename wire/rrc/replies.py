@@ -118,17 +118,43 @@ class StatusA:
     speed_down_count: int
     alarm_count: int
 
-    def encode(self) -> bytes:
-        """Write the line with CHECK and LF."""
+    @staticmethod
+    def line(
+        stick_pct: tuple[int, int],
+        out_pct: tuple[int, int],
+        gauge: int,
+        speed_mode: int,
+        counts: tuple[int, int, int],
+    ) -> bytes:
+        r"""Write the line of these values with its CHECK and LF.
+
+        Args:
+            stick_pct: #1 and #2.
+            out_pct: #3 and #4.
+            gauge: #5.
+            speed_mode: #6.
+            counts: #7, #8 and #9.
+
+        >>> StatusA.line((100, 0), (50, 0), 10, 1, (0, 0, 0))
+        b'SA:64003200A1000F\n'
+        """
         # SA:64003200A1000F: numbers in two's complement with two digits (FF = -1, 9C = -100), then
         # five nibbles and CHECK. SA has its CHECK in every mode; EV, OK and ER have no CHECK.
-        message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
-            *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
-            *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),
-            *(self.gauge, self.speed_mode),
-            *(self.speed_up_count, self.speed_down_count, self.alarm_count),
-        )
+        percentages = (stick_pct[0] & 0xFF) << 24 | (stick_pct[1] & 0xFF) << 16
+        percentages |= (out_pct[0] & 0xFF) << 8 | out_pct[1] & 0xFF
+        nibbles = gauge << 16 | speed_mode << 12 | counts[0] << 8 | counts[1] << 4 | counts[2]
+        message = b"SA:%013X" % (percentages << 20 | nibbles)  # one number is formatted, not nine
         return message + check_digit(message) + b"\n"
+
+    def encode(self) -> bytes:
+        """Write the line with CHECK and LF."""
+        return StatusA.line(
+            (self.in_v_pct, self.in_w_pct),
+            (self.out_v_pct, self.out_w_pct),
+            self.gauge,
+            self.speed_mode,
+            (self.speed_up_count, self.speed_down_count, self.alarm_count),
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,12 @@ from tickrig.device.physical import InputSignal, SignalType
 from tickrig.device.twin import twin
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.replay import read_recording, replay
-from tickrig.emulators.rig.station import next_tick_us
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.testing.properties import device_bench
 from tickrig.emulators.testing.properties.contract import check_acts, must
 from tickrig.emulators.testing.properties.strategies import Session, Word
 from tickrig.host.text.trace import Header
+from tickrig.wire.instant import next_tick_us
 
 # Theory of operation
 # ===================

@@ -12,10 +12,10 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.station import Station, next_tick_us
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.strategies import Act, Session
-from tickrig.wire.instant import NEVER
+from tickrig.wire.instant import NEVER, next_tick_us
 
 NOTHING: Final[Session] = ()
 
