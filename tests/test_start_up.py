@@ -13,7 +13,8 @@ from pathlib import Path
 import click
 import pytest
 
-from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
+from tickrig.device.body import SIDES
+from tickrig.emulators.canopen.choices import AUTO, BODIES, MODELS, PROFILES
 from tickrig.emulators.canopen.eds import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
 from tickrig.emulators.commands.cli import main as tickrig
@@ -119,6 +120,7 @@ def test_the_work_of_a_command_takes_its_options(command: click.Command) -> None
 def test_what_can_be_named_is_what_there_is() -> None:
     assert tuple(CANOPEN_MODELS) == MODELS
     assert (AUTO, *CANOPEN_PROFILES) == PROFILES
+    assert tuple(SIDES) == BODIES
     assert next(each.proposals for each in LITE_FIELDS if each.name == "node") == tuple(COMPONENTS)
 
 

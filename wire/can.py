@@ -164,12 +164,12 @@ Frames = tuple[CanFrame, ...]
 # identifier and control field are put together so that they end on a byte, and the zeros that fill
 # the front are skipped.
 #
-# `_feed` computes the effect of one byte on each state. `_rows` turns the results into lists that
-# refer to each other, one set for each possible number of stuff bits (at most 29). Following a byte
-# is then one index into a list, and `reduce(getitem, data, row)` follows all bytes in C. The last
-# row that it reaches holds the number at its end. `_head` caches the state of a frame after its
-# DLC, because the same identifiers occur repeatedly. The CRC of 15 bits is fed like data, with one
-# additional bit that differs from the last bit of the CRC and so never completes a run itself.
+# `_fed_bytes` computes the effect of each byte on each state. `_rows` turns the results into lists
+# that refer to each other, one set for each possible number of stuff bits (at most 29). Following a
+# byte is then one index into a list, and `reduce(getitem, data, row)` follows all bytes in C. The
+# last row that it reaches holds the number at its end. `_head` caches the state of a frame after
+# its DLC, because the same identifiers occur repeatedly. The CRC of 15 bits is fed like data, with
+# one additional bit that differs from the last bit of the CRC and so never completes a run itself.
 #
 # tests/wire/test_can_bits.py, which counts single bits, checks changes to this code. `fd_bits` uses
 # the same automaton for the data. In the CRC field of CAN FD the stuff bits are at fixed places.
@@ -281,21 +281,36 @@ def crc16(stream: bytes) -> int:
     return crc
 
 
-def _feed(state: int, byte: int) -> tuple[int, int]:
-    """Return the state after eight more bits, and the number of stuffed bits."""
-    fill = _FILL_BITS.get(state, 0)
-    last, run = (None, 0) if fill else (state >> 2, (state & 3) + 1)
-    stuffed = 0
-    for place in reversed(range(8 - fill)):
-        bit = byte >> place & 1
-        run = run + 1 if bit == last else 1
-        last = bit
-        if run == 5:
-            last, run, stuffed = 1 - bit, 1, stuffed + 1
-    return (last or 0) << 2 | run - 1, stuffed
+def _fed(state: int, bits: int) -> list[tuple[int, int]]:
+    """Return for each value of a few more bits the next state, and the number of stuffed bits."""
+    # last bit, length of its run, stuffed bits; a frame begins without a last bit
+    ends = [(state >> 2, (state & 3) + 1 if state not in _FILL_BITS else 0, 0)]
+    for _ in range(bits):
+        ends = [_follow(end, bit) for end in ends for bit in (0, 1)]
+    return [(last << 2 | run - 1, stuffed) for last, run, stuffed in ends]
 
 
-_FED: Final = tuple(_feed(state, byte) for state in range(_STATES) for byte in range(256))
+def _follow(end: tuple[int, int, int], bit: int) -> tuple[int, int, int]:
+    last, run, stuffed = end
+    run = run + 1 if bit == last else 1
+    return (bit, run, stuffed) if run < 5 else (1 - bit, 1, stuffed + 1)
+
+
+def _fed_bytes() -> list[tuple[int, int]]:
+    """Return by state << 8 | byte the next state, and the number of stuffed bits."""
+    halves = [_fed(state, 4) for state in range(START_STANDARD)]
+    fed = [
+        (after, first + second)
+        for half in halves
+        for between, first in half
+        for after, second in halves[between]
+    ]
+    for state, fill in _FILL_BITS.items():
+        fed += _fed(state, 8 - fill) * (1 << fill)
+    return fed
+
+
+_FED: Final = _fed_bytes()
 NEXT: Final = tuple(state << 8 for state, _ in _FED)
 """Next state << 8, by state << 8 | byte."""
 STUFFED: Final = tuple(stuffed for _, stuffed in _FED)

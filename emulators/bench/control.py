@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from queue import Empty, SimpleQueue
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from tickrig.emulators.bench.operator import PRESS_US, Operator, WireFaults, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
@@ -15,6 +14,9 @@ from tickrig.host.control.requests import Object, RequestDispatcher, short, text
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 _MAX_LINES: Final = 100
 _MAX_PRESS_US: Final = 10**15
@@ -195,8 +197,6 @@ def _setting(value: object) -> Setting:
 
 # Requests to an emulator from another thread, served between its steps.
 
-_Answers = Future[list[Object]]
-
 
 class EmulatorEnded(Exception):  # noqa: N818 - no error
     """The emulator has ended and no longer answers."""
@@ -211,16 +211,18 @@ class RequestInbox:
 
     def __init__(self, control: EmulatorControl) -> None:
         self._control = control
-        self._posted: SimpleQueue[tuple[Sequence[Object], _Answers]] = SimpleQueue()
+        self._posted: SimpleQueue[tuple[Sequence[Object], Future[list[Object]]]] = SimpleQueue()
         self._closed = False
 
-    def post(self, requests: Sequence[Object]) -> _Answers:
+    def post(self, requests: Sequence[Object]) -> Future[list[Object]]:
         """Submit requests. The emulator answers them together, between two steps.
 
         The future raises EmulatorEnded if the emulator ends before it answers. The future is not
         cancelled in this case, because an event loop would then end the task that waits for it.
         """
-        answers: _Answers = Future()
+        from concurrent.futures import Future  # noqa: PLC0415 - slow
+
+        answers: Future[list[Object]] = Future()
         self._posted.put((requests, answers))
         if self._closed:
             self.serve()

@@ -17,12 +17,12 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodyOnDrives
-from tickrig.emulators.canopen.choices import AUTO, is_bus_node
+from tickrig.emulators.canopen.choices import AUTO, LSS, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node, SecondNodeAlarm, side_of
-from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.node_spec import NodeSpec
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.clock import Clock

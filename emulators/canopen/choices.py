@@ -30,6 +30,12 @@ MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Physical faults by name of the model, in addition to the faults of every node."""
 
+BODIES: Final = ("differential", "skid-steer")
+"""Kinds of body, the keys of `device.body.SIDES`."""
+
+LSS: Final = "lss"
+"""In place of a node-ID: the node waits for LSS to assign one."""
+
 _BUS_NODE: Final = re.compile(r".+\.ya?ml:.+", re.IGNORECASE)
 
 

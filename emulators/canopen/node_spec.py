@@ -9,11 +9,8 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.canopen.choices import LSS, MODELS
 from tickrig.host.text.user_file import SUFFIX
-
-LSS: Final = "lss"
-"""Text in place of a node-ID, for a node that waits until LSS assigns a node-ID."""
 
 _IDS: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 from tickrig.emulators.fields import DeviceField, read_config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.scenario import Encoder, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
 from tickrig.host.text.trace import Config, Header
@@ -17,6 +16,8 @@ from tickrig.host.text.user_file import SUFFIX, explain_error
 
 if TYPE_CHECKING:
     import click
+
+    from tickrig.emulators.scenario import Encoder, Sender
 
 _SEED: Final = "seed"
 """Key in traces for wire faults. A replay does not need it, because it has the resulting

@@ -11,11 +11,8 @@ characters are spelt out. The HTML has no links, scripts or addresses.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from html import escape
 from itertools import islice
 from typing import Final
-
-from tickrig.host.text.page_text import harmless
 
 _MOST_CHARACTERS: Final = 400
 _LEFT: Final = ' style="text-align:left"'
@@ -31,6 +28,10 @@ def text(value: object) -> str:
     more = len(shown) - _MOST_CHARACTERS
     if more > 0:
         shown = f"{shown[:_MOST_CHARACTERS]} … {more} more"
+    from html import escape  # noqa: PLC0415 - only notebooks need it
+
+    from tickrig.host.text.page_text import harmless  # noqa: PLC0415 - as above
+
     return escape(str(harmless(shown)))
 
 

@@ -40,7 +40,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import date, time
 from math import isfinite
 from typing import Any, Final
 
@@ -67,8 +66,8 @@ def shown(value: object) -> str:
             return "a table"
         case list():
             return "a list"
-        case date() | time():
-            return value.isoformat()
+    if hasattr(value, "isoformat"):  # a date or a time
+        return str(value.isoformat())
     text = f"{value!r:.{_LONGEST + 1}}" if isinstance(value, str) else str(value)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 

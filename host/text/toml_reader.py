@@ -14,7 +14,6 @@ library only for scalars.
 from __future__ import annotations
 
 import re
-import tomllib
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -213,6 +212,8 @@ def load_toml(text: str) -> dict[str, Any]:
     Raises:
         TOMLDecodeError: the text is invalid TOML, or is nested too deeply.
     """
+    import tomllib  # noqa: PLC0415 - slow
+
     if found := _PARTS.search(text):
         line = text.count("\n", 0, found.start()) + 1
         reason = f"a key of more than {_MOST_DEEP} parts (at line {line}, column 1)"
@@ -415,7 +416,9 @@ class _Reader:
         return _Leaf(self._line(start), BROKEN)
 
     def _scalar(self, token: str) -> Any:
-        """Return the value of a token. Report an invalid token, and return BROKEN."""
+        """Return the value of a token; report an invalid one, and return BROKEN."""
+        import tomllib  # noqa: PLC0415 - slow
+
         if _WHOLE.fullmatch(token):
             return int(token)
         if token.isprintable() and _SIMPLE.fullmatch(token):  # a parser for each takes long

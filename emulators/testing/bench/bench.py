@@ -22,7 +22,6 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
-from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.links.link import Closing
 from tickrig.host.text import notebook
 from tickrig.host.text.names import near
@@ -36,10 +35,12 @@ if TYPE_CHECKING:
 
     from tickrig.emulators.testing.bench.modes import hardware_mode, real_mode
     from tickrig.emulators.testing.bench.modes.operators import Terminal
+    from tickrig.emulators.testing.rig_file import reader
     from tickrig.host.links.link import Link
-else:  # POSIX
+else:  # two of them are for POSIX
     hardware_mode = LazyModule("tickrig.emulators.testing.bench.modes.hardware_mode")
     real_mode = LazyModule("tickrig.emulators.testing.bench.modes.real_mode")
+    reader = LazyModule("tickrig.emulators.testing.rig_file.reader")  # it makes nodes
 
 
 class BenchTranscript(str):
@@ -674,21 +675,8 @@ def open_bench(
         ValueError: a device cannot be made.
         PortGone: a bus cannot be opened.
     """
-    plan = read_rig_file(Path(path))
-    plan = plan if seed is None else replace(plan, seed=seed)
-    return Bench.of_plan(plan, mode, limit=limit)
-
-
-def _limit_us_of(limit: Duration) -> int:
-    """Return a limit in microseconds, `NEVER` if there is none.
-
-    Raises:
-        ValueError: it is not a time.
-
-    >>> _limit_us_of("2s"), _limit_us_of("none") == _limit_us_of(0) == NEVER
-    (2000000, True)
-    """
-    return NEVER if limit == _NO_LIMIT else us_of(limit) or NEVER
+    plan = reader.read_rig_file(Path(path))
+    return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
 
 
 def _never() -> bool:

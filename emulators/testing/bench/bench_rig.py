@@ -9,14 +9,13 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import Assembly, AssemblyFaults, FaultOrder, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
-from tickrig.emulators.canopen.body import BodyOnDrives
-from tickrig.emulators.canopen.node import NodeSide
-from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.emulators.canopen import late
 from tickrig.emulators.record.frames import FrameFormat, hex_text
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
@@ -28,8 +27,6 @@ from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
-from tickrig.emulators.testing.signals.driver import SignalDriver
-from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text import notebook
 from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.byte_text import escape
@@ -40,8 +37,14 @@ from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.emulators.canopen.body import BodyOnDrives
+    from tickrig.emulators.canopen.store_file import StoreFile
     from tickrig.emulators.serial.network import NetworkPort
     from tickrig.emulators.serial.pty_port import PtyPort
+    from tickrig.emulators.testing.signals import driver
+    from tickrig.emulators.testing.signals.sources import SignalSpec
+else:  # only a bench with signals needs it
+    driver = LazyModule("tickrig.emulators.testing.signals.driver")
 
 
 # Journal of a bench: lines and frames of all wires, and actions on the devices.
@@ -264,7 +267,7 @@ class Parts:
     def assembly(self) -> Assembly:
         """The physical side of all devices."""
         devices = {name: part for mount in self.mounts for name, part in mount.parts.items()}
-        return Assembly({**devices, **{body.name: NodeSide(body) for body in self.bodies}})
+        return Assembly({**devices, **{body.name: late.NodeSide(body) for body in self.bodies}})
 
     @property
     def faults(self) -> AssemblyFaults:
@@ -325,10 +328,10 @@ class RigState(Copyable):
             for name, value in values.items():
                 self.assembly.parts[device].inputs.set(name, value)
 
-    def _drivers(self, parts: Parts) -> Sequence[SignalDriver]:
+    def _drivers(self, parts: Parts) -> Sequence[driver.SignalDriver]:
         if not parts.signals:
             return ()
-        return (SignalDriver(parts.signals, self.assembly.parts, parts.seed),)
+        return (driver.SignalDriver(parts.signals, self.assembly.parts, parts.seed),)
 
     @property
     def chances(self) -> Sequence[FaultyPort[bytes] | CanFaults]:

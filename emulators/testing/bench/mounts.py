@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.faults import NodeFaults
-from tickrig.emulators.canopen.node import Node, NodeSide
+from tickrig.emulators.canopen import late
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
@@ -22,6 +20,9 @@ from tickrig.emulators.serial.bridge import Tap
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.text.bench_header import DeviceEntry, WireEntry, WireType
 from tickrig.wire.can import Frames
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.slave import CanopenSlave
 
 BIT_RATE: Final = 1_000_000
 
@@ -123,8 +124,8 @@ class BusMount(Copyable):
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
         self.name, self.wire = name, CanWire(bit_rate, seed)
-        self.nodes: dict[str, Node] = {}
-        self.node_faults: dict[str, NodeFaults] = {}
+        self.nodes: dict[str, late.Node] = {}
+        self.node_faults: dict[str, late.NodeFaults] = {}
         self.entries: dict[str, DeviceEntry] = {}
         self.open_end(frozenset())
 
@@ -136,8 +137,8 @@ class BusMount(Copyable):
             slave: the slave.
             entry: trace entry of the slave, if it can be rebuilt.
         """
-        node = self.nodes[name] = Node(name, slave, self.wire)
-        self.node_faults[name] = NodeFaults(node, self.wire)
+        node = self.nodes[name] = late.Node(name, slave, self.wire)
+        self.node_faults[name] = late.NodeFaults(node, self.wire)
         self.entries[name] = entry or DeviceEntry(self.name)
 
     def open_end(self, accepts: frozenset[int] | None = None) -> CanEnd:
@@ -159,7 +160,7 @@ class BusMount(Copyable):
     @property
     def parts(self) -> Mapping[str, HasSignals]:
         """The physical side of each node."""
-        return {name: NodeSide(node) for name, node in self.nodes.items()}
+        return {name: late.NodeSide(node) for name, node in self.nodes.items()}
 
     @property
     def wire_entry(self) -> WireEntry:

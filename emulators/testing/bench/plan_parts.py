@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.device.canopen.sdo import SdoServers
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig._lazy import LazyModule
 from tickrig.emulators.bench.operator import FaultOrder
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice, DeviceType, configure
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.port import ByteLine
@@ -34,15 +33,20 @@ from tickrig.emulators.testing.rig_file.plan import (
     seed_of,
 )
 from tickrig.emulators.testing.rig_file.plan import node_id as read_node_id
-from tickrig.emulators.testing.rig_file.probe import eds_cache
-from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.log import log_of
 from tickrig.host.text.trace import Config
 from tickrig.host.text.values import Setting
 
 if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
+    from tickrig.device.canopen.slave import CanopenSlave
     from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
+    from tickrig.emulators.testing.rig_file import probe
+    from tickrig.emulators.testing.signals.sources import SignalSpec
+else:  # it makes nodes
+    probe = LazyModule("tickrig.emulators.testing.rig_file.probe")
 
 
 _logger = log_of(__name__)
@@ -60,7 +64,7 @@ def parts_of(plan: RigPlan) -> Parts:
             type does not know an option. A signal is invalid.
     """
     alone = len(plan.wires) == 1
-    stores: dict[Path, StoreFile] = {}
+    stores: dict[Path, late.StoreFile] = {}
     mounts: list[Mount] = []
     for wire in plan.wires.values():
         devices, seed = plan.devices_on(wire.name), seed_of(plan.seed, wire.name, alone=alone)
@@ -81,7 +85,7 @@ def parts_of(plan: RigPlan) -> Parts:
 
 
 def _settings_of(start: Mapping[str, Setting | SignalSpec]) -> dict[str, Setting]:
-    return {key: value for key, value in start.items() if not isinstance(value, SignalSpec)}
+    return {key: value for key, value in start.items() if isinstance(value, int | float | str)}
 
 
 def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
@@ -90,7 +94,7 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
         f"{device.name}/{name}": value
         for device in plan.devices.values()
         for name, value in device.start.items()
-        if isinstance(value, SignalSpec)
+        if not isinstance(value, int | float | str)
     }
 
 
@@ -141,7 +145,7 @@ def _settings(
 
 
 def _bus(
-    wire: WirePlan, devices: Iterable[DevicePlan], seed: int, stores: dict[Path, StoreFile]
+    wire: WirePlan, devices: Iterable[DevicePlan], seed: int, stores: dict[Path, late.StoreFile]
 ) -> BusMount:
     mount = BusMount(wire.name, wire.bit_rate or BIT_RATE, seed)
     for device in devices:
@@ -150,7 +154,7 @@ def _bus(
 
 
 def _slave_of(
-    device: DevicePlan, stores: dict[Path, StoreFile]
+    device: DevicePlan, stores: dict[Path, late.StoreFile]
 ) -> tuple[CanopenSlave, DeviceEntry]:
     """Return a slave and its trace entry; add its store file to `stores`.
 
@@ -159,7 +163,7 @@ def _slave_of(
         _NoNodeIdError: the device has no node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
-    description = late.describe(eds_cache(), kind, device.profile or AUTO)
+    description = late.describe(probe.eds_cache(), kind, device.profile or AUTO)
     for line in late.finding_lines(description.warnings):
         _logger.warning("%s: %s", device.name, line)
     node_id = description.node_id if device.node_id is None else device.node_id
@@ -170,9 +174,10 @@ def _slave_of(
         dictionary, memory = description.make_dictionary(), None
         if device.store:
             if device.store not in stores:
-                stores[device.store] = StoreFile(device.store)
+                stores[device.store] = late.StoreFile(device.store)
             memory = stores[device.store].nonvolatile(device.name, dictionary)
-        slave = late.make_slave(dictionary, node_id, memory, description.application, device.sdo)
+        limits = device.sdo or late.USUAL
+        slave = late.make_slave(dictionary, node_id, memory, description.application, limits)
     profile, files = device.profile or AUTO, description.files
     return slave, node_entry(device.wire, slave, kind, profile, files)
 
@@ -222,12 +227,21 @@ def rig_of(
 _BUS: Final = "can"
 """Default bus of nodes."""
 
-BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
+if TYPE_CHECKING:
+    BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
+else:
+    BenchedDevice = Emulated[bytes] | DeviceType | str
 """A device, a device type, or a text like `type` in rig files: the name of a device type or of a
 CANopen model, an EDS or DCF file, or `FILE.py:Class`. A model, an EDS or DCF file, or a class may
 have a node-ID in front: `5=drive.eds`."""
 
 _NODE: Final = re.compile(r"[0-9]+=")
+
+
+def _is_slave(device: BenchedDevice) -> TypeIs[CanopenSlave]:
+    """Return whether a device is a slave; if nothing has imported slaves, it is none."""
+    module = sys.modules.get("tickrig.device.canopen.slave")
+    return module is not None and isinstance(device, module.CanopenSlave)
 
 
 def mounts_of(
@@ -254,15 +268,17 @@ def mounts_of(
     for name, device in devices.items():
         plan = named_device(device, Path(), name) if isinstance(device, str) else None
         is_node = plan is not None and plan.kind is not DeviceKind.SERIAL
-        if is_node or isinstance(device, CanopenSlave):
+        if is_node or _is_slave(device):
             mount = mounts.setdefault(_BUS, BusMount(_BUS, seed=seed))
             assert isinstance(mount, BusMount)
-            if isinstance(device, CanopenSlave):
+            if _is_slave(device):
                 _set_timeout(device, sdo_timeout_us)
                 mount.add(name, device, node_entry(_BUS, device))
             elif plan is not None:
                 if sdo_timeout_us is not None:
-                    plan = replace(plan, sdo=replace(plan.sdo, timeout_us=sdo_timeout_us))
+                    plan = replace(
+                        plan, sdo=replace(plan.sdo or late.USUAL, timeout_us=sdo_timeout_us)
+                    )
                 mount.add(name, *_slave(mount, plan))
             continue
         if not isinstance(device, str | DeviceType):
@@ -278,7 +294,7 @@ def mounts_of(
 
 def _set_timeout(slave: CanopenSlave, sdo_timeout_us: int | None) -> None:
     if sdo_timeout_us is not None:
-        servers = SdoServers.of(slave)
+        servers = late.SdoServers.of(slave)
         servers.limit(replace(servers.limits, timeout_us=sdo_timeout_us))
 
 
@@ -363,7 +379,7 @@ def name_of(device: BenchedDevice) -> str:
     >>> name_of("rtc-lite"), name_of("5=eds/drive.eds")
     ('rtc_lite', 'drive')
     """
-    if isinstance(device, CanopenSlave):
+    if _is_slave(device):
         return f"node{device.configured_id}"
     if isinstance(device, DeviceType):
         device = device.name

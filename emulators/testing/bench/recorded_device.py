@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.sdo import USUAL, SdoLimits, SdoServers
-from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO, PROFILES, is_bus_node
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.store_file import drop_misfits, memory_values, parse_memory
 from tickrig.emulators.commands.device_type import build_recorded, check_no_code
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry
 from tickrig.host.text.trace import Header
 from tickrig.host.text.user_file import SUFFIX
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.dictionary import Dictionary
+    from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 
 _PROFILE: Final = "profile"
 _SDO_TIMEOUT: Final = "sdo_timeout_us"
@@ -46,9 +44,10 @@ def node_entry(
         OSError: a file cannot be read.
     """
     file = _file_of(str(device)) if isinstance(device, str) else device
-    sdo = next((x.limits for x in slave.services if isinstance(x, SdoServers)), USUAL)
+    servers, usual = late.SdoServers, late.USUAL
+    sdo = next((x.limits for x in slave.services if isinstance(x, servers)), usual)
     config: dict[str, str | int] = {_PROFILE: profile} if isinstance(device, Path) else {}
-    if sdo != USUAL:
+    if sdo != usual:
         config |= {_SDO_TIMEOUT: sdo.timeout_us, _SDO_MEMORY: sdo.memory_bytes}
     memory = slave.nonvolatile
     stored = memory.parameters or memory.node_id or memory.bit_rate_index is not None
@@ -59,7 +58,7 @@ def node_entry(
         slave.configured_id,
         _hash(file) if file else "",
         {each.name: _hash(each) for each in files},
-        memory_values(memory) if stored else {},
+        late.memory_values(memory) if stored else {},
     )
 
 
@@ -97,7 +96,7 @@ def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
     return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 
-def _node(name: str, entry: DeviceEntry, folder: Path, cache: late.EdsCache) -> Node:
+def _node(name: str, entry: DeviceEntry, folder: Path, cache: late.EdsCache) -> late.Node:
     device = _found(entry, folder)
     profile = str(entry.config.get(_PROFILE, AUTO))
     if profile not in PROFILES:
@@ -107,20 +106,21 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: late.EdsCache) -> 
         _check_same(file, entry.files.get(file.name))
     dictionary = description.make_dictionary()
     memory = _memory(entry, dictionary) if entry.stored else None
-    sdo = SdoLimits(
-        int(entry.config.get(_SDO_TIMEOUT) or USUAL.timeout_us),
-        int(entry.config.get(_SDO_MEMORY, USUAL.memory_bytes) or 0),
+    usual = late.USUAL
+    sdo = late.SdoLimits(
+        int(entry.config.get(_SDO_TIMEOUT) or usual.timeout_us),
+        int(entry.config.get(_SDO_MEMORY, usual.memory_bytes) or 0),
     )
     slave = late.make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
-    return Node(name, slave, CanWire())
+    return late.Node(name, slave, CanWire())
 
 
 def _memory(entry: DeviceEntry, dictionary: Dictionary) -> Nonvolatile:
     try:
-        memory = parse_memory(entry.stored)
+        memory = late.parse_memory(entry.stored)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"what it had stored is damaged: {error!r}") from None
-    if misfits := drop_misfits(memory, dictionary):
+    if misfits := late.drop_misfits(memory, dictionary):
         raise ValueError(f"it has no room for what it had stored at {misfits[0]}")
     return memory
 
@@ -138,6 +138,8 @@ def _found(entry: DeviceEntry, folder: Path) -> Path | str:
 
 
 def _hash(file: Path) -> str:
+    from hashlib import sha256  # noqa: PLC0415 - slow
+
     return sha256(file.read_bytes()).hexdigest()
 
 

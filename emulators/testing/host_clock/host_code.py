@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import sysconfig
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -49,7 +48,14 @@ themselves. On a real port these packages need real time."""
 _KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
 
 _INSTALLED: Final = tuple(f"{os.sep}{name}{os.sep}" for name in ("site-packages", "dist-packages"))
-_PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
+
+
+@cache
+def _python_folders() -> tuple[str, ...]:
+    """Return the folders of the standard library."""
+    import sysconfig  # noqa: PLC0415 - slow
+
+    return tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
 
 
 @cache
@@ -66,7 +72,7 @@ def is_host(module: str, file: str) -> bool:
     package = module.partition(".")[0]
     if package in _KEPT or package.startswith(_KEPT_BEGINNINGS) or file.startswith("<frozen"):
         return False
-    return is_installed(file) or not file.startswith(_PYTHON)
+    return is_installed(file) or not file.startswith(_python_folders())
 
 
 @cache

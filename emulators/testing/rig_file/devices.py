@@ -9,13 +9,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.device.canopen.sdo import USUAL, SdoLimits
+from tickrig._lazy import LazyModule
+from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import MODELS, is_bus_node
-from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
-from tickrig.emulators.serial.network import parse_serve_url
 from tickrig.emulators.testing.rig_file import plan
 from tickrig.emulators.testing.rig_file.plan import (
     CANOPEN_DEVICE,
@@ -34,6 +33,12 @@ from tickrig.emulators.testing.rig_file.plan import (
 from tickrig.host.text.names import closest, near
 from tickrig.host.text.section import Schema, Section, shown
 from tickrig.host.text.user_file import SUFFIX
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.sdo import SdoLimits
+    from tickrig.emulators.serial import network
+else:  # sockets and pyserial are slow
+    network = LazyModule("tickrig.emulators.serial.network")
 
 _BUS: Final = "can"
 """Name of the bus that a file may omit."""
@@ -83,9 +88,9 @@ class DeviceReader:
             if device is not None and device.store is not None:
                 try:
                     if device.store.exists() and not device.store.is_file():
-                        raise StoreError(f"{device.store}: not a file")
-                    StoreFile(device.store)
-                except StoreError as error:
+                        raise late.StoreError(f"{device.store}: not a file")
+                    late.StoreFile(device.store)
+                except late.StoreError as error:
                     self.sections[name].wrong(str(error), "store")
                 except OSError as error:
                     self.sections[name].wrong(f"{device.store}: {error.strerror}", "store")
@@ -173,11 +178,12 @@ class DeviceReader:
         return name
 
 
-def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits:
+def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits | None:
     if "sdo_timeout" not in values and "sdo_memory" not in values:
-        return USUAL
-    return SdoLimits(
-        values.get("sdo_timeout", USUAL.timeout_us), values.get("sdo_memory", USUAL.memory_bytes)
+        return None
+    usual = late.USUAL
+    return late.SdoLimits(
+        values.get("sdo_timeout", usual.timeout_us), values.get("sdo_memory", usual.memory_bytes)
     )
 
 
@@ -381,7 +387,7 @@ class DoorReader:
         seen: dict[object, str] = {}
         for wire, door in doors.items():
             places: list[object] = [door.link] if door.link else []
-            served = [url for url in map(parse_serve_url, door.serve) if url.port]
+            served = [url for url in map(network.parse_serve_url, door.serve) if url.port]
             places += [f"port {url.port} of {url.host}" for url in served]
             for place in places:
                 if place in seen:
@@ -395,7 +401,7 @@ class DoorReader:
 def _is_url(section: Section, url: str) -> bool:
     """Return whether a line can be served at a URL; record the error if not."""
     try:
-        parse_serve_url(url)
+        network.parse_serve_url(url)
     except ValueError as error:
         section.wrong(str(error), "serve")
         return False

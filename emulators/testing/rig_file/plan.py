@@ -7,17 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
-from tickrig.device.body import SIDES
-from tickrig.device.canopen.sdo import USUAL, SdoLimits
-from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.operator import FaultSpec
-from tickrig.emulators.canopen.body import BodyPlan
-from tickrig.emulators.canopen.choices import AUTO, PROFILES
-from tickrig.emulators.canopen.node_spec import LSS
-from tickrig.emulators.testing.signals.sources import SignalSpec
+from tickrig.emulators.canopen import late
+from tickrig.emulators.canopen.choices import AUTO, BODIES, LSS, PROFILES
 from tickrig.host.text.section import (
     Field,
     Schema,
@@ -36,6 +31,11 @@ from tickrig.host.text.section import (
 )
 from tickrig.host.text.toml_reader import Mistake
 from tickrig.host.text.values import Setting, counted
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.sdo import SdoLimits
+    from tickrig.emulators.canopen.body import BodyPlan
+    from tickrig.emulators.testing.signals.sources import SignalSpec
 
 # What a rig file says, as plain values: what is on the bench, and where it is.
 #
@@ -140,13 +140,12 @@ class DevicePlan:
             `FILE.yml:NODE` or `FILE.py:Class`.
         wire: name of the wire, which is a key of `RigPlan.wires`.
         config: options of a device type by name, as in the file.
-        node_id: node-ID 1..127, or `UNCONFIGURED`, or None to use the node-ID of the DCF or model.
-        profile: profile of a device that a file describes, which is one of `choices.PROFILES`, or
-            None for `auto`.
-        store: file for the data that a CANopen node stores by object 1010h and LSS.
-        sdo: limits of the SDO servers of a CANopen node.
-        start: initial inputs by name, with the members of groups one by one. The value is a value,
-            or the signal that drives the input.
+        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
+        profile: of a file; one of `choices.PROFILES`; None for `auto`.
+        store: file for the data that a CANopen node stores by 1010h and LSS.
+        sdo: limits of the SDO servers of a CANopen node; None for the usual ones.
+        start: initial inputs by name, with the members of groups one by one: a value, or the signal
+            that drives the input.
         made: the device, if the reader has made it and no bench uses it yet.
     """
 
@@ -158,7 +157,7 @@ class DevicePlan:
     node_id: int | None = None
     profile: str | None = None
     store: Path | None = None
-    sdo: SdoLimits = USUAL
+    sdo: SdoLimits | None = None
     start: Mapping[str, Setting | SignalSpec] = field(default_factory=dict)
     made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
 
@@ -400,8 +399,10 @@ def device_text(device: DevicePlan) -> str:
     >>> device_text(DevicePlan(name="left", kind=DeviceKind.MODEL, type="epos", wire="a"))
     'left (epos)'
     """
-    node = {None: "", UNCONFIGURED: f", waits for {LSS.upper()}"}
-    about = node.get(device.node_id, f", node-ID {device.node_id}")
+    about = ""
+    if device.node_id is not None:
+        waits = device.node_id == late.UNCONFIGURED
+        about = f", waits for {LSS.upper()}" if waits else f", node-ID {device.node_id}"
     return f"{device.name} ({Path(device.type).name}{about})"
 
 
@@ -478,7 +479,7 @@ def framing(value: object) -> str:
 def node_id(value: object) -> int:
     """Return a node-ID, or the word for a node that waits for a node-ID."""
     if value == LSS:
-        return UNCONFIGURED
+        return late.UNCONFIGURED
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 127:
         return value
     raise ValueError(f"it takes 1..127, or {LSS} for a node that waits for LSS, not {shown(value)}")
@@ -554,7 +555,7 @@ CANOPEN_DEVICE: Final[Schema] = _DEVICE | {
 }
 
 BODY: Final[Schema] = {
-    "kind": Field(one_of(*SIDES), ", ".join(f'"{name}"' for name in SIDES), "how it is driven"),
+    "kind": Field(one_of(*BODIES), ", ".join(f'"{name}"' for name in BODIES), "how it is driven"),
     "wheel_radius_m": Field(number(1e-4, 100), "above 0", "of each wheel, in m"),
     "tread_m": Field(number(1e-3, 1_000), "above 0", "between left and right wheels, in m"),
     "mass_kg": Field(number(0, 1e6), "0 or more", "mass on the driven wheels, in kg", "0"),

@@ -104,7 +104,7 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
         late.ANY_ID if node_id is None else node_id,
         None,
         found.application,
-        plan.sdo,
+        plan.sdo or late.USUAL,
     )
     node = NodeSide(Node(plan.name, slave, CanWire()))
     title = found.info.product_name or Path(plan.type).name

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,6 +29,17 @@ def test_a_host_and_hands_share_one_time() -> None:
         assert bench.wait_until(lambda: bench.get("state") == "Standby", within="2s")
         client.output(30, 0, confirm=True)
         assert (bench.get("out_v_pct"), bench.now_us) == (30, client.now_us)
+
+
+def test_a_serial_bench_imports_nothing_that_others_need() -> None:
+    program = (
+        "import sys; from tickrig import Bench\n"
+        "with Bench('rrc') as bench: bench.run_for('100ms')\n"
+        "print(*sys.modules)"
+    )
+    modules = subprocess.check_output([sys.executable, "-c", program], text=True).split()
+    others = "tickrig.device.canopen", "tickrig.wire.canopen", "tickrig.emulators.testing.signals"
+    assert [name for name in modules if name.startswith((*others, "can.", "tomllib"))] == []
 
 
 UPLOAD = to_message(CanFrame.parse("610#4008100000000000"))
