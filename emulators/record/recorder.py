@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import IO, Any, Final, Generic, NamedTuple, Protocol, SupportsIndex, TypeVar
 
 from tickrig.device.core import Device, W
@@ -438,6 +437,8 @@ class _Spool:
 
     def keep(self, text: str) -> _Lines:
         """Append a text."""
+        from tempfile import TemporaryFile  # noqa: PLC0415 - slow, and most runs are short
+
         data = text.encode()
         if not self._failed:
             try:

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from shutil import rmtree
 from typing import Final
 
 from tickrig.host.text.log import log_of
@@ -121,6 +120,8 @@ def replacing(path: Path) -> Iterator[Path]:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
         if folder is not None:
+            from shutil import rmtree  # noqa: PLC0415 - slow
+
             rmtree(folder, ignore_errors=True)
 
 

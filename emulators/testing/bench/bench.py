@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 
 from tickrig._lazy import LazyModule
@@ -575,6 +574,8 @@ class Bench(BenchDevice, Closing):
         Raises:
             OSError: no temporary file can be written.
         """
+        from tempfile import TemporaryDirectory  # noqa: PLC0415 - slow
+
         with TemporaryDirectory(prefix="tickrig.") as folder:
             path = Path(folder) / "bench.trace"
             self.save_trace(path)

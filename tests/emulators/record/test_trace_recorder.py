@@ -215,7 +215,7 @@ def test_a_long_run_stays_in_memory_where_no_file_can_be_written(
     def refused() -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tickrig.emulators.record.recorder.TemporaryFile", refused)
+    monkeypatch.setattr("tempfile.TemporaryFile", refused)
     recorder = TraceRecorder(None, HEADER)
     long_run(recorder, 3 * TICKS_KEPT)
     assert len([*recorder.lines(0)]) == 2 + 3 * TICKS_KEPT
