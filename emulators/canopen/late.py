@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tickrig.device.canopen.sdo import SdoServers as SdoServers
     from tickrig.device.canopen.slave import UNCONFIGURED as UNCONFIGURED
     from tickrig.device.canopen.stack import make_slave as make_slave
+    from tickrig.emulators.can.wire import CanWire as CanWire
     from tickrig.emulators.canopen.build import ANY_ID as ANY_ID
     from tickrig.emulators.canopen.build import describe as describe
     from tickrig.emulators.canopen.build import store_keeper as store_keeper
@@ -40,6 +41,7 @@ else:
             "tickrig.device.canopen.sdo": ("USUAL", "SdoLimits", "SdoServers"),
             "tickrig.device.canopen.slave": ("UNCONFIGURED",),
             "tickrig.device.canopen.stack": ("make_slave",),
+            "tickrig.emulators.can.wire": ("CanWire",),
             "tickrig.emulators.canopen.build": ("ANY_ID", "describe", "store_keeper"),
             "tickrig.emulators.canopen.bus_file.bus_nodes": ("read_bus",),
             "tickrig.emulators.canopen.bus_file.node_keys": ("BusMistakesError",),

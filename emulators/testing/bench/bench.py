@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 from tickrig._lazy import LazyModule
 from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.bench.operator import parse_fault_spec
-from tickrig.emulators.record.replay import BenchRecording, read_trace
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import plan_parts, tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts, text_of
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     import canopen
     import serial
 
+    from tickrig.emulators.record.replay import BenchRecording
     from tickrig.emulators.testing.bench.modes import hardware_mode, real_mode
     from tickrig.emulators.testing.bench.modes.operators import Terminal
     from tickrig.emulators.testing.rig_file import reader
@@ -575,6 +575,8 @@ class Bench(BenchDevice, Closing):
             OSError: no temporary file can be written.
         """
         from tempfile import TemporaryDirectory  # noqa: PLC0415 - slow
+
+        from tickrig.emulators.record.replay import read_trace  # noqa: PLC0415 - slow
 
         with TemporaryDirectory(prefix="tickrig.") as folder:
             path = Path(folder) / "bench.trace"

@@ -14,7 +14,6 @@ from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import Assembly, AssemblyFaults, FaultOrder, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen import late
 from tickrig.emulators.record.frames import FrameFormat, hex_text
 from tickrig.emulators.record.recorder import TraceRecorder
@@ -37,6 +36,7 @@ from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.emulators.can.faults import CanFaults
     from tickrig.emulators.canopen.body import BodyOnDrives
     from tickrig.emulators.canopen.store_file import StoreFile
     from tickrig.emulators.serial.network import NetworkPort

@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import WireFaults
-from tickrig.emulators.can.end import CanEnd
-from tickrig.emulators.can.faults import CanFaults
-from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import late
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
@@ -23,6 +20,8 @@ from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.slave import CanopenSlave
+    from tickrig.emulators.can.end import CanEnd
+    from tickrig.emulators.can.faults import CanFaults
 
 BIT_RATE: Final = 1_000_000
 
@@ -123,7 +122,7 @@ class BusMount(Copyable):
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
-        self.name, self.wire = name, CanWire(bit_rate, seed)
+        self.name, self.wire = name, late.CanWire(bit_rate, seed)
         self.nodes: dict[str, late.Node] = {}
         self.node_faults: dict[str, late.NodeFaults] = {}
         self.entries: dict[str, DeviceEntry] = {}

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO, PROFILES, is_bus_node
 from tickrig.emulators.commands.device_type import build_recorded, check_no_code
@@ -112,7 +111,7 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: late.EdsCache) -> 
         int(entry.config.get(_SDO_MEMORY, usual.memory_bytes) or 0),
     )
     slave = late.make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
-    return late.Node(name, slave, CanWire())
+    return late.Node(name, slave, late.CanWire())
 
 
 def _memory(entry: DeviceEntry, dictionary: Dictionary) -> Nonvolatile:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from tickrig._lazy import LazyModule
 from tickrig.device.twin import twin
-from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US, HostLimit
@@ -34,9 +33,10 @@ if TYPE_CHECKING:
     import canopen
     import serial
 
-    from tickrig.emulators.can.outside import interface, sim_network
+    from tickrig.emulators.can.outside import host, interface, sim_network
     from tickrig.host.links.link import Link
 else:  # python-can and canopen are slow
+    host = LazyModule("tickrig.emulators.can.outside.host")
     interface = LazyModule("tickrig.emulators.can.outside.interface")
     sim_network = LazyModule("tickrig.emulators.can.outside.sim_network")
 
@@ -238,7 +238,7 @@ class _VirtualDoors:
         """Connect a link."""
         mount = self._mounts[wire]
         if isinstance(mount, BusMount):
-            return CanHost(self._rig, mount.open_end())
+            return host.CanHost(self._rig, mount.open_end())
         return SimLink(self._rig, mount.line.b)
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
