@@ -23,7 +23,6 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.recorded_device import node_entry
-from tickrig.emulators.testing.rig_file.devices import RIG_SUFFIXES, kind_of
 from tickrig.emulators.testing.rig_file.plan import (
     DeviceKind,
     DevicePlan,
@@ -32,7 +31,6 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
     seed_of,
 )
-from tickrig.emulators.testing.rig_file.plan import node_id as read_node_id
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.log import log_of
 from tickrig.host.text.trace import Config
@@ -43,9 +41,12 @@ if TYPE_CHECKING:
 
     from tickrig.device.canopen.slave import CanopenSlave
     from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
-    from tickrig.emulators.testing.rig_file import probe
+    from tickrig.emulators.testing.rig_file import devices as named
+    from tickrig.emulators.testing.rig_file import keys, probe
     from tickrig.emulators.testing.signals.sources import SignalSpec
-else:  # it makes nodes
+else:  # of devices that a text names
+    keys = LazyModule("tickrig.emulators.testing.rig_file.keys")
+    named = LazyModule("tickrig.emulators.testing.rig_file.devices")
     probe = LazyModule("tickrig.emulators.testing.rig_file.probe")
 
 
@@ -311,12 +312,12 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
         ValueError: the text does not name a device.
     """
     node, _, rest = text.rpartition("=") if _NODE.match(text) else ("", "", text)
-    if rest.lower().endswith(RIG_SUFFIXES):
+    if rest.lower().endswith(named.RIG_SUFFIXES):
         raise ValueError(f"{rest} is a rig file: open_bench({rest!r}) opens its bench")
-    kind, place = kind_of(rest, folder)
+    kind, place = named.kind_of(rest, folder)
     if node and kind is DeviceKind.SERIAL:
         raise ValueError(f"{text}: {rest} is on no CAN bus, and has no node-ID")
-    node_id = read_node_id(int(node)) if node else None
+    node_id = keys.node_id(int(node)) if node else None
     return DevicePlan(name=name, kind=kind, type=place, wire=_BUS, node_id=node_id)
 
 

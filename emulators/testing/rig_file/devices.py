@@ -16,7 +16,7 @@ from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import MODELS, is_bus_node
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.testing.rig_file import plan
-from tickrig.emulators.testing.rig_file.plan import (
+from tickrig.emulators.testing.rig_file.keys import (
     CANOPEN_DEVICE,
     HARDWARE,
     HARDWARE_BUS,

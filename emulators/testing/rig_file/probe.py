@@ -18,7 +18,8 @@ from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.rig.faults import FaultForm
-from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, MadeDevice, check_name
+from tickrig.emulators.testing.rig_file.keys import check_name
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, MadeDevice
 from tickrig.emulators.testing.signals.driver import SLASH, check_signals
 from tickrig.emulators.testing.signals.sources import Constant, SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec

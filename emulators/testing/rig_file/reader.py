@@ -26,9 +26,8 @@ from tickrig.emulators.testing.rig_file.devices import (
     kind_of,
     read_wires,
 )
+from tickrig.emulators.testing.rig_file.keys import BODY, TOP
 from tickrig.emulators.testing.rig_file.plan import (
-    BODY,
-    TOP,
     DeviceKind,
     DevicePlan,
     FaultPlan,
