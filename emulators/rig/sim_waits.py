@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import queue
 from collections import deque
 from collections.abc import Callable
@@ -10,9 +9,10 @@ from threading import get_ident
 from typing import Final, Generic, Protocol, TypeVar
 
 from tickrig.device.twin import Copyable, restore
+from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 
-_LOG = logging.getLogger(__name__)
+_LOG = log_of(__name__)
 
 EPOCH_S: Final = 946_684_800
 """Time on the clock of hosts at the start of a rig: 2000-01-01."""

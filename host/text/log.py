@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
-import logging
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    import logging
+
+
+class _Logger:
+    """The logger of a module, which imports `logging` at its first message.
+
+    Most programs log nothing, and `logging` takes a thirtieth of `from tickrig import Bench`.
+    """
+
+    _real: logging.Logger | None = None
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copy it as `logging` copies a logger: by its name."""
+        return log_of, (self._name,)
+
+    def __getattr__(self, name: str) -> object:
+        """Return the attribute of the logger."""
+        if self._real is None:
+            import logging  # noqa: PLC0415 - slow
+
+            library = logging.getLogger("tickrig")
+            if not library.handlers:
+                library.addHandler(logging.NullHandler())
+            self._real = logging.getLogger(self._name)
+        found: object = getattr(self._real, name)
+        return found
 
 
 def log_of(name: str) -> logging.Logger:
     """Return the logger of a module."""
-    return logging.getLogger(name)
-
-
-logging.getLogger("tickrig").addHandler(logging.NullHandler())
+    return cast("logging.Logger", _Logger(name))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import traceback
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -37,6 +36,8 @@ def explain_error(error: BaseException, file: str = "") -> str:
     """Return an error in a user's file as one line, with its place if known."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"
+    import traceback  # noqa: PLC0415 - slow
+
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)

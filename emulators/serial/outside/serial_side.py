@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import Looks, OneThread
+from tickrig.host.text.log import log_of
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, Character, UartReceiver, UartSetting
@@ -415,7 +415,7 @@ class HostTransmitter(Copyable):
 
 # The waits of a host on a rig, and errors for hosts that would wait endlessly.
 
-_LOG = logging.getLogger(__name__)
+_LOG = log_of(__name__)
 
 LONGEST_US: Final = 3_600_000_000
 """Longest wait without a timeout (an hour), which then ends with an exception."""

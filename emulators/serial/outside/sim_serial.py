@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copyreg
 import io
-import logging
 import warnings
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NoReturn, cast
@@ -27,6 +26,7 @@ from tickrig.emulators.serial.outside.serial_side import (
     ModemLines,
     SerialSide,
 )
+from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import Parity, UartSetting
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # A pyserial port on a rig: opened and closed, its settings, its modem lines.
 
-_LOG = logging.getLogger(__name__)
+_LOG = log_of(__name__)
 
 
 class _SimPort(SerialBase):
