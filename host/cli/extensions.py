@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from tickrig.host.cli.start import load
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 
@@ -91,6 +90,8 @@ class ExtensionGroup(Generic[T]):
         return self._checked(f"{self.what} {point.name!r} of package {package}", point.value)
 
     def _checked(self, place: str, path: str) -> T:
+        from tickrig.host.cli.start import load  # noqa: PLC0415 - slow, and often not needed
+
         try:
             found: T = load(path.partition("[")[0].strip())
         except (Exception, SystemExit) as error:  # a foreign module may raise anything
