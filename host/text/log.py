@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
@@ -28,9 +29,7 @@ class _Logger:
         if self._real is None:
             import logging  # noqa: PLC0415 - slow
 
-            library = logging.getLogger("tickrig")
-            if not library.handlers:
-                library.addHandler(logging.NullHandler())
+            _silence()
             self._real = logging.getLogger(self._name)
         found: object = getattr(self._real, name)
         return found
@@ -39,3 +38,16 @@ class _Logger:
 def log_of(name: str) -> logging.Logger:
     """Return the logger of a module."""
     return cast("logging.Logger", _Logger(name))
+
+
+def _silence() -> None:
+    """Let the messages of the library go nowhere unless the program has handlers."""
+    import logging  # noqa: PLC0415 - slow
+
+    library = logging.getLogger("tickrig")
+    if not library.handlers:
+        library.addHandler(logging.NullHandler())
+
+
+if "logging" in sys.modules:
+    _silence()
