@@ -159,7 +159,7 @@ class Node(Copyable):
                 self._coasts_us = self.application.without_power(now_us)
             return ()
         try:
-            if self._ticked:
+            if self._ticked and self._pending:
                 self._catch_up(now_us)
             self._ticked = True
             return self.slave.tick(now_us, rx)

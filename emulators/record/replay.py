@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import groupby, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic
 
@@ -76,12 +76,16 @@ def _play(
     next_us, arriving = next(traffic, (NEVER, nothing))
     for change in (*changes, _Change(until_us + 1, _nothing)):
         horizon.until_us = last_us = change.at_us - 1
-        while (at_us := next_tick_us(now_us, min(device.due_us, next_us), tick_us)) <= last_us:
+        while True:
+            due_us = device.due_us
+            at_us = next_tick_us(now_us, min(due_us, next_us), tick_us)
+            if at_us > last_us:
+                break
             rx = nothing
             while next_us <= at_us:
                 rx += arriving  # type: ignore[operator]  # bytes or a tuple
                 next_us, arriving = next(traffic, (NEVER, nothing))
-            if (rx or device.due_us <= at_us) and (tx := device.tick(at_us, rx)):
+            if (rx or due_us <= at_us) and (tx := device.tick(at_us, rx)):
                 sent.append((at_us, tx))
             horizon.passed_us = now_us = at_us
         horizon.passed_us = now_us = max(now_us, last_us)
@@ -393,14 +397,24 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, _Traffic, int]]:
-    """Yield the traffic of one direction: time, all data and first line of each tick."""
-    passed = (record for record in records if record.mark is mark)
-    for at_us, group in groupby(passed, key=lambda record: record.at_us):
-        first, *more = group
-        if isinstance(first.traffic, bytes):
-            yield at_us, b"".join(x.traffic for x in (first, *more)), first.line  # type: ignore[misc]  # one device, one type
-        else:
-            yield at_us, tuple(x.traffic for x in (first, *more)), first.line  # type: ignore[misc]  # as above
+    """Yield the traffic of one direction: time, all data of the tick, its first line."""
+    together: list[Any] = []
+    at_us = line = -1
+    for record in records:
+        if record.mark is not mark:
+            continue
+        if record.at_us != at_us:
+            if together:
+                yield at_us, _joined(together), line
+            at_us, line, together = record.at_us, record.line, []
+        together.append(record.traffic)
+    if together:
+        yield at_us, _joined(together), line
+
+
+def _joined(together: list[Any]) -> _Traffic:
+    """Return the traffic of a tick: bytes, or frames."""
+    return b"".join(together) if isinstance(together[0], bytes) else tuple(together)
 
 
 def do(device: Any, record: BenchRecord) -> None:
