@@ -236,7 +236,8 @@ class Stage:
             said = "the host drives" if drive is cmd.Output else "drives, within limits"
             assert hint == said, f"panel: {hint}, client: {drive.__name__}"
         if running and rrc._settings.status and (latest := self.client.latest_status):
-            assert view.decoded == latest.value == rrc._status(), "panel: status line"
+            assert view.decoded == latest.value, "panel: status line"
+            assert latest.value.encode() == rrc._status(), "client: status line"
         shown = running and (rrc._settings.status or self._is_fresh)
         assert shown or not view.report, "panel: an old status line"
 
