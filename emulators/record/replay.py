@@ -51,7 +51,7 @@ class _Change:
 
 def _play(
     device: Device[W],
-    received: Iterable[tuple[int, W]],
+    received: Iterable[tuple[int, W, int]],
     changes: Iterable[_Change],
     nothing: W,
     until_us: int,
@@ -63,8 +63,8 @@ def _play(
 
     Args:
         device: a new device.
-        received: traffic with its times, sorted.
-        changes: actions on the device, sorted by time.
+        received: the traffic with its times and lines, sorted.
+        changes: the actions on it, sorted.
         nothing: empty traffic.
         until_us: time of the last tick.
     """
@@ -72,8 +72,8 @@ def _play(
     horizon, tick_us, now_us = Horizon(), device.tick_us, 0
     if hasattr(device, "horizon"):
         device.horizon = horizon
-    traffic = iter(received)
-    next_us, arriving = next(traffic, (NEVER, nothing))
+    traffic, end = iter(received), (NEVER, nothing, 0)
+    next_us, arriving, _ = next(traffic, end)
     for change in (*changes, _Change(until_us + 1, _nothing)):
         horizon.until_us = last_us = change.at_us - 1
         while True:
@@ -84,7 +84,7 @@ def _play(
             rx = nothing
             while next_us <= at_us:
                 rx += arriving  # type: ignore[operator]  # bytes or a tuple
-                next_us, arriving = next(traffic, (NEVER, nothing))
+                next_us, arriving, _ = next(traffic, end)
             if (rx or due_us <= at_us) and (tx := device.tick(at_us, rx)):
                 sent.append((at_us, tx))
             horizon.passed_us = now_us = at_us
@@ -110,7 +110,7 @@ def _first_difference(
     """
     silence = (NEVER, nothing, 0)
     for then, now in zip_longest(recorded, replayed, fillvalue=silence):
-        if then[:2] != now[:2]:
+        if then[0] != now[0] or then[1] != now[1]:
             first_us = min(then[0], now[0])
             _, old, line = then if then[0] == first_us else silence
             return ReplayDifference(first_us, old, now[1] if now[0] == first_us else nothing, line)
@@ -165,7 +165,7 @@ def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[
         TraceError: the trace names an input that the device does not have.
     """
     records = recording.records
-    received = ((r.at_us, r.data) for r in records if r.mark is trace.Mark.TO_DEVICE)
+    received = ((r.at_us, r.data, r.line) for r in records if r.mark is trace.Mark.TO_DEVICE)
     changes = (
         _Change(r.at_us, partial(_set_signal, device, r))
         for r in records
@@ -385,12 +385,12 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
     """
     nothing: _Traffic = () if recording.header.on_can(name) else b""
     records = recording.of(name)
-    received = ((at, what) for at, what, _ in traffic_of(records, trace.Mark.TO_DEVICE))
-    changes = (
+    received, physical = traffic_of(records, trace.Mark.TO_DEVICE), trace.Mark.PHYSICAL
+    changes = [
         _Change(record.at_us, partial(do, device, record))
         for record in records
-        if record.mark is trace.Mark.PHYSICAL
-    )
+        if record.mark is physical
+    ]
     return _play(device, received, changes, nothing, recording.until_us)
 
 
@@ -400,14 +400,13 @@ def traffic_of(
     """Yield the traffic of one direction: time, all data of the tick, its first line."""
     together: list[Any] = []
     at_us = line = -1
-    for record in records:
-        if record.mark is not mark:
-            continue
+    for record in [record for record in records if record.mark is mark]:
         if record.at_us != at_us:
             if together:
                 yield at_us, _joined(together), line
-            at_us, line, together = record.at_us, record.line, []
-        together.append(record.traffic)
+            at_us, line, together = record.at_us, record.line, [record.traffic]
+        else:
+            together.append(record.traffic)
     if together:
         yield at_us, _joined(together), line
 
