@@ -59,6 +59,7 @@ from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
+from tickrig.emulators.rig.sim_waits import HostLimit
 from tickrig.emulators.rig.station import Station, Timetable, is_wire_port
 from tickrig.wire.instant import NEVER, next_tick_us
 

@@ -679,7 +679,20 @@ def open_bench(
         PortGone: a bus cannot be opened.
     """
     plan = reader.read_rig_file(Path(path))
-    return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
+    plan = plan if seed is None else replace(plan, seed=seed)
+    return Bench.of_plan(plan, mode, limit=limit)
+
+
+def _limit_us_of(limit: Duration) -> int:
+    """Return a limit in microseconds, or `NEVER` for no limit.
+
+    Raises:
+        ValueError: the limit is not a time.
+
+    >>> _limit_us_of("2s"), _limit_us_of("none") == _limit_us_of(0) == NEVER
+    (2000000, True)
+    """
+    return NEVER if limit == _NO_LIMIT else us_of(limit) or NEVER
 
 
 def _never() -> bool:

@@ -32,7 +32,7 @@ _FRAMING: Final = re.compile(r"[5-8][NEOMS](1|1\.5|2)")
 
 
 def check_name(name: str) -> None:
-    """Raise ValueError unless a device, wire or signal can be called so."""
+    """Raise ValueError unless a text can be the name of a device, wire or signal."""
     if len(name) > _LONGEST_NAME:
         raise ValueError(f"a name of {len(name)} letters; {_LONGEST_NAME} are enough")
     if not _NAME.fullmatch(name):
@@ -42,14 +42,14 @@ def check_name(name: str) -> None:
 
 
 def framing(value: object) -> str:
-    """Take data bits, parity and stop bits."""
+    """Return data bits, parity and stop bits."""
     if isinstance(value, str) and _FRAMING.fullmatch(value):
         return value
     raise ValueError(f"it takes data bits, parity and stop bits as 8N1, not {shown(value)}")
 
 
 def node_id(value: object) -> int:
-    """Take a node-ID, or the word of a node that waits for one."""
+    """Return a node-ID, or the word for a node that waits for a node-ID."""
     if value == LSS:
         return late.UNCONFIGURED
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 127:
@@ -61,9 +61,9 @@ _MOST_BAUD: Final = 50_000_000
 _NONE: Final = "none"
 _ITS_DEVICE: Final = "that of its device"
 
-_BAUD: Final = Field(whole(50, _MOST_BAUD), f"50..{_MOST_BAUD}", "bits a second", _ITS_DEVICE)
+_BAUD: Final = Field(whole(50, _MOST_BAUD), f"50..{_MOST_BAUD}", "bit rate, in bit/s", _ITS_DEVICE)
 _BITRATE: Final = Field(
-    whole(10_000, 1_000_000), "10000..1000000", "bits a second", "that of a DCF, or 1000000"
+    whole(10_000, 1_000_000), "10000..1000000", "bit rate, in bit/s", "that of a DCF, or 1000000"
 )
 _TYPE: Final = {
     "type": Field(
@@ -76,15 +76,15 @@ _LINE: Final = {
     "baud": _BAUD,
     "framing": Field(framing, '"8N1", "7E2", ...', "data bits, parity, stop bits", '"8N1"'),
     "buffer_bytes": Field(
-        whole(1, 1 << 24), f"1..{1 << 24}", "room of each sender and receiver", _ITS_DEVICE
+        whole(1, 1 << 24), f"1..{1 << 24}", "size of each transmit and receive buffer", _ITS_DEVICE
     ),
 }
 _RS485: Final = {
-    "echo": Field(flag, "true, false", "each end hears its own bytes too", "false"),
+    "echo": Field(flag, "true, false", "each end also receives the bytes that it sends", "false"),
     "bursts": Field(
         flag,
         "true, false",
-        "a receiver takes what was sent back to back when it has ended",
+        "bytes without a gap between them arrive together, after the last one",
         "false",
     ),
 }
@@ -94,7 +94,7 @@ WIRES: Final[Mapping[WireType, Schema]] = {
     WireType.RS485: _TYPE | _LINE | _RS485,
     WireType.CAN: _TYPE | {"bitrate": _BITRATE},
 }
-"""Of `[wire.NAME]`."""
+"""The keys of `[wire.NAME]`."""
 
 _DEVICE: Final = {
     "type": Field(
@@ -130,19 +130,23 @@ BODY: Final[Schema] = {
     "kind": Field(one_of(*BODIES), ", ".join(f'"{name}"' for name in BODIES), "how it is driven"),
     "wheel_radius_m": Field(number(1e-4, 100), "above 0", "of each wheel, in m"),
     "tread_m": Field(number(1e-3, 1_000), "above 0", "between left and right wheels, in m"),
-    "mass_kg": Field(number(0, 1e6), "0 or more", "on the driven wheels, in kg", "0"),
-    "friction": Field(number(0, 10), "0..10", "between wheels and ground", "they never slip"),
+    "mass_kg": Field(number(0, 1e6), "0 or more", "mass on the driven wheels, in kg", "0"),
+    "friction": Field(
+        number(0, 10), "0..10", "friction between wheels and ground", "the wheels never slip"
+    ),
     "mirrored": Field(
-        texts, "a list of wheels", "their drive is mounted the other way round", _NONE
+        texts, "a list of wheels", "wheels whose drive is mounted the other way round", _NONE
     ),
 }
-"""Beside the wheels of its kind."""
+"""The keys of `[body]`, in addition to the wheels of its kind."""
 
 _BUS: Final[Schema] = {
     "interface": Field(text, "a driver of python-can", "of the bus outside"),
-    "channel": Field(text, "a text", "of the driver, as can0", _NONE),
-    "bitrate": Field(_BITRATE.field, _BITRATE.values, "for the driver to set", "as it is"),
-    "options": Field(table, "a table", "more for the driver", _NONE),
+    "channel": Field(text, "a text", "channel of the driver, such as can0", _NONE),
+    "bitrate": Field(
+        _BITRATE.field, _BITRATE.values, "bit rate that the driver sets", "not changed"
+    ),
+    "options": Field(table, "a table", "further options of the driver", _NONE),
 }
 
 REAL: Final[Schema] = {"control": Field(path, "a file", "control socket of the bench", _NONE)}
@@ -164,28 +168,32 @@ HARDWARE_LINE: Final[Schema] = {
 HARDWARE_BUS: Final[Schema] = _BUS
 HARDWARE_DEVICE: Final[Schema] = {
     "control": Field(path, "a file", "as above, for this device", "that of all"),
-    "power_on": Field(command, "a command line", "switches it on", "the operator does it"),
-    "power_off": Field(command, "a command line", "switches it off", "the operator does it"),
+    "power_on": Field(command, "a command line", "switches the device on", "the operator does it"),
+    "power_off": Field(
+        command, "a command line", "switches the device off", "the operator does it"
+    ),
 }
 TOLERANCE: Final[Schema] = {
-    "stick_pct": Field(number(0, 50), "0..50", "how far a stick held by hand may be off", "10"),
-    "time_ms": Field(number(0, 1_000), "0..1000", "how far a time may be off", "50"),
+    "stick_pct": Field(
+        number(0, 50), "0..50", "largest deviation of a stick that is held by hand, in %", "10"
+    ),
+    "time_ms": Field(number(0, 1_000), "0..1000", "largest deviation of a time, in ms", "50"),
 }
 
 TOP: Final[Schema] = {
-    "seed": Field(whole(0, (1 << 63) - 1), "0 or more", "of all chance", "0"),
+    "seed": Field(whole(0, (1 << 63) - 1), "0 or more", "seed of all random numbers", "0"),
     "bus": Field(path, "a file", "bus.yml of ros2_canopen: each node is a device", _NONE),
     **{
         name: Field(table, "tables", meaning, _NONE)
         for name, meaning in (
             ("wire", "what connects devices and hosts"),
-            ("device", "what is on the bench"),
-            ("signal", "values for formulas, see below"),
-            ("fault", "faults by device or wire, see below"),
-            ("safe", "outputs when a test is over, see below"),
-            ("body", "what drives move"),
-            ("real", "the bench in real time"),
-            ("hardware", "where the real devices are"),
+            ("device", "the devices"),
+            ("signal", "signals that formulas can use"),
+            ("fault", "faults of devices and wires"),
+            ("safe", "outputs at the end of each test"),
+            ("body", "a body that drives move"),
+            ("real", "how hosts connect in real time"),
+            ("hardware", "ports of the real devices"),
         )
     },
 }
@@ -207,4 +215,4 @@ PAGE: Final[Mapping[str, Schema]] = {
     "`[hardware.NAME]`, of a device": HARDWARE_DEVICE,
     "`[hardware.tolerance]`": TOLERANCE,
 }
-"""All tables, by what the page calls them."""
+"""The keys of all tables, by the name of the table on the page of the manual."""

@@ -1,4 +1,4 @@
-"""What a rig file says; its keys are in `keys.py`."""
+"""The content of a rig file. The keys of its tables are in `keys.py`."""
 
 from __future__ import annotations
 
@@ -123,12 +123,13 @@ class DevicePlan:
             `FILE.yml:NODE` or `FILE.py:Class`.
         wire: name of the wire, which is a key of `RigPlan.wires`.
         config: options of a device type by name, as in the file.
-        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
-        profile: of a file; one of `choices.PROFILES`; None for `auto`.
-        store: file for the data that a CANopen node stores by 1010h and LSS.
-        sdo: limits of the SDO servers of a CANopen node; None for the usual ones.
-        start: initial inputs by name, with the members of groups one by one: a value, or the signal
-            that drives the input.
+        node_id: node-ID 1..127, or `UNCONFIGURED`, or None to use the node-ID of the DCF or model.
+        profile: profile of a device that a file describes, which is one of `choices.PROFILES`, or
+            None for `auto`.
+        store: file for the data that a CANopen node stores by object 1010h and LSS.
+        sdo: limits of the SDO servers of a CANopen node, or None for the default limits.
+        start: initial inputs by name, with the members of groups one by one. The value is a value,
+            or the signal that drives the input.
         made: the device, if the reader has made it and no bench uses it yet.
     """
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from tickrig.device.body import SIDES
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.testing.rig_file.keys import PAGE
+from tickrig.emulators.testing.rig_file.keys import BODY, PAGE
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.host.text.section import rows
 
