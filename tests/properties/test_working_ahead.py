@@ -112,7 +112,7 @@ class Bench:
     def look(self) -> object:
         """Return all that is to be seen, and what is inside."""
         node, motor = self.node, self.drive.axis.motor
-        reference, plant = self.drive.axis.reference, motor._plant  # type: ignore[attr-defined]
+        reference, plant = self.drive.axis.reference, motor._plant  # type: ignore[union-attr]
         return (
             [node.read(name) for name in node.outputs],
             [entry.present() for entry in node.slave.dictionary if entry.index >= 0x2000],

@@ -813,8 +813,7 @@ class LosesEvents(EventDriven):
     """Loses events within the inhibit time."""
 
     def request(self, entry: Entry | None = None) -> None:
-        sender = self.sender
-        if isinstance(sender, Tpdo) and sender._node.now_us >= self._free_us:
+        if self.sender._node.now_us >= self._free_us:
             super().request(entry)
 
 
