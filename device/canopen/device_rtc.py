@@ -22,7 +22,7 @@ from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 T = TypeVar("T")
 
 
-class CanopenPort(Generic[T]):
+class _CanopenPort(Generic[T]):
     """Base of both kinds of ports.
 
     Args:
@@ -65,7 +65,7 @@ class CanopenPort(Generic[T]):
         return self.port_type.decode([entry.data for entry in self.entries])
 
 
-class CanopenInPort(CanopenPort[T]):
+class CanopenInPort(_CanopenPort[T]):
     """A port that the bus writes, by RPDO or SDO, and the component reads.
 
     Attributes:
@@ -91,7 +91,7 @@ class CanopenInPort(CanopenPort[T]):
         self.is_new = True
 
 
-class CanopenOutPort(CanopenPort[T]):
+class CanopenOutPort(_CanopenPort[T]):
     """A port that the component writes.
 
     Its TPDO is sent once in a tick in which the component writes the port.
@@ -153,7 +153,7 @@ class CanopenComponent(DeviceComponent):
 
     def __init__(self) -> None:
         self.inputs = QuantityBank(self.physical)
-        self.ports = {port.name: port for port in self._own_ports(CanopenPort)}
+        self.ports = {port.name: port for port in self._own_ports(_CanopenPort)}
 
     @classmethod
     def profile(cls) -> rtc_canopen.RtcProfile:
@@ -166,7 +166,7 @@ class CanopenComponent(DeviceComponent):
                 category=cls.category,
                 rate_hz=cls.rate_hz,
                 product_code=cls.product_code,
-                ports=tuple(port.profile for _, port in declared(cls, CanopenPort)),
+                ports=tuple(port.profile for _, port in declared(cls, _CanopenPort)),
             )
         except ValueError as error:
             raise ValueError(f"{cls.__name__}: {error}") from None

@@ -184,7 +184,7 @@ def _digital_input_names(lines: int) -> tuple[str, ...]:
     return tuple(f"di{line}" for line in range(1, lines + 1))
 
 
-def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
+def _inputs_of(names: Sequence[str]) -> Iterator[InputSignal]:
     """Yield the digital inputs, for which 1 is high."""
     for line, name in enumerate(names, 1):
         yield InputSignal(name, f"digital input {line}")
@@ -360,7 +360,7 @@ class Ds401(Application):
         return _FaultDetector(self.node, faults)
 
     def _has_physical_inputs(self) -> None:
-        lines = digital_inputs(self._lines)
+        lines = _inputs_of(self._lines)
         analogue = (channel.input for channel in self.analogue_inputs)
         faults = (fault.input for fault in self._faults.faults)
         self.has_inputs((*lines, *analogue, *faults), _groups(self._lines))

@@ -139,7 +139,7 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
     return ()
 
 
-def longest_ms(name: str, words: Sequence[Any]) -> int:
+def _longest_action_ms(name: str, words: Sequence[Any]) -> int:
     """Return the longest duration of a bound macro."""
     return _LONGEST_MS[name](words)
 
@@ -428,7 +428,7 @@ def _longest_ms(action: Action) -> int:
         case Period(_, ms, times):
             return ms * (times + 2)
         case Macro(name, words):
-            return longest_ms(name, words)
+            return _longest_action_ms(name, words)
         case Act():
             return _STIMULUS_MS
         case Send() | Forget() | Keep():

@@ -142,7 +142,7 @@ def conf() -> None:
 @_component_name
 @click.option("-l", "--long", is_flag=True, help="Show the values of each set.")
 @at
-def list_(at: Path, name: str, long: bool) -> None:
+def _list(at: Path, name: str, long: bool) -> None:
     """List the parameters of the component NAME with their present values, and its sets.
 
     \b
@@ -304,7 +304,7 @@ def dis(at: Path, ports: tuple[str, ...]) -> None:
 @click.command("exit")
 @_names_needed
 @at
-def exit_(at: Path, names: tuple[str, ...]) -> None:
+def _exit(at: Path, names: tuple[str, ...]) -> None:
     """End the components NAMES, and their connectors.
 
     \b
@@ -343,7 +343,7 @@ def inject(at: Path, port: str, value: str) -> None:
 @click.option("--for", "duration", metavar="TIME", help="End after this time, as 2s.")
 @click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a value.")
 @at
-def print_(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
+def _print(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
     """Print what the OutPort PORT writes from now on, one value per line, until Ctrl-C.
 
     A line is the value's time in seconds and its data as JSON.
@@ -415,7 +415,7 @@ def _report_lost(answer: Any, latest: Any) -> None:
         click.echo(f"{lost} values lost: they came faster than they were taken", err=True)
 
 
-VERBS: Final = (ls, cat, create, con, dis, *_MOVES, exit_, inject, print_)
+VERBS: Final = (ls, cat, create, con, dis, *_MOVES, _exit, inject, _print)
 
 
 # The verbs of `tickrig rtc` about a system as a whole.
