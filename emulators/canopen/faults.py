@@ -208,6 +208,7 @@ class _NodeFaultType(FaultForm):
         abort: function that returns the frame with which the fault itself answers the request.
         controller: function that acts on the CAN controller.
         silent: whether the node neither sends nor receives until the held frame has been sent.
+        in_order: whether later SDO answers wait until the held answer has been sent.
         boots: whether the second node sends a boot-up first.
     """
 
@@ -224,6 +225,7 @@ class _NodeFaultType(FaultForm):
     )
     controller: bool = field(default=False, kw_only=True)
     silent: bool = field(default=False, kw_only=True)
+    in_order: bool = field(default=False, kw_only=True)
     boots: bool = field(default=False, kw_only=True)
 
 
@@ -452,6 +454,7 @@ NODE_FAULTS: Final[Mapping[str, _NodeFaultType]] = {
         "each SDO answer is late",
         _late,
         _time("delay", "800ms", "how much later it comes"),
+        in_order=True,
     ),
     "sdo_twice": _on(
         _NodeFrames.SDO,
@@ -565,6 +568,7 @@ class NodeFaults(Copyable):
         self._blocks = _SdoBlocks()
         self._held: list[tuple[int, int, CanFrame]] = []  # a heap: when, which one, the frame
         self._count, self._silent_us, self._now_us = 0, 0, 0
+        self._answer_us = 0  # before this time the SDO server sends no further answer
         self.listeners: Listeners[Callable[[int, Mark, Frames, Frames], None]] = Listeners()
 
     @property
@@ -616,6 +620,7 @@ class NodeFaults(Copyable):
         if armed.fault_type.silent:
             self._silent_us = 0
         self._held = [(0, count, frame) for _, count, frame in sorted(self._held)]
+        self._answer_us = 0
 
     def acted(self, name: str) -> int:
         """Return how often a fault has acted since it was last armed."""
@@ -663,6 +668,7 @@ class NodeFaults(Copyable):
         self._now_us = now_us
         if not self.node.is_on:
             self._held.clear()
+            self._answer_us = 0
             return received, ()
         left, sent = list[CanFrame](), list[CanFrame]()
         for frame in received:
@@ -679,12 +685,17 @@ class NodeFaults(Copyable):
 
     def after(self, now_us: int, sent: Frames) -> Frames:
         """Return the frames sent in a tick: the node's frames after faults, and delayed frames."""
-        left = list[CanFrame]()
+        left = self._released(now_us - 1)
         for frame in sent:
             left += self._send(frame)
-        while self._held and self._held[0][0] <= now_us:
-            left.append(heappop(self._held)[2])
-        return tuple(left)
+        return (*left, *self._released(now_us))
+
+    def _released(self, until_us: int) -> list[CanFrame]:
+        """Take the delayed frames that are due, in order."""
+        due = list[CanFrame]()
+        while self._held and self._held[0][0] <= until_us:
+            due.append(heappop(self._held)[2])
+        return due
 
     def _receive(self, frame: CanFrame, sent: list[CanFrame]) -> Frames:
         kind = self._kind_of_received(frame)
@@ -711,10 +722,15 @@ class NodeFaults(Copyable):
             )
             if armed.fault_type.silent:
                 self._silent_us = self._now_us + armed["delay"]
+            if armed.fault_type.in_order:
+                self._answer_us = max(self._answer_us, self._now_us + armed["delay"])
+        # A server answers one request after the other: no answer overtakes a late one.
+        waits = bool(kind & _NodeFrames.SDO) and self._answer_us >= self._now_us > 0
+        first_us = self._answer_us - self._now_us if waits else 0
         for late_us, each in coming:
-            if late_us:
-                self._hold(self._now_us + late_us, each)
-        at_once = tuple(each for late_us, each in coming if not late_us)
+            if late_us or waits:
+                self._hold(self._now_us + max(late_us, first_us), each)
+        at_once = tuple(each for late_us, each in coming if not (late_us or waits))
         return self._hear(Mark.FROM_DEVICE, frame, at_once)
 
     def _acting_on(self, kind: _NodeFrames, frame: CanFrame) -> list[_ArmedNodeFault]:

@@ -156,6 +156,25 @@ def test_a_late_answer_is_taken_for_that_to_the_next_request(master: Master) -> 
     assert 300_000 < master.bench.now_us - begun_us < 305_000
 
 
+@pytest.mark.parametrize("cleared", [False, True])
+@pytest.mark.parametrize("spec", ["sdo_slow=600ms", "sdo_slow=600ms,count=1"])
+def test_no_answer_overtakes_a_late_one(master: Master, spec: str, *, cleared: bool) -> None:
+    fault(master, spec)
+    for index in (0x6081, 0x1000, 0x1018):
+        request = bytes([0x40, *index.to_bytes(2, "little"), 0, 0, 0, 0, 0])
+        master.network.send_message(0x602, request)
+        if cleared and index == 0x1000:
+            master.bench["axis2"].clear("sdo_slow")
+        else:
+            master.bench.run_for("200ms")
+    answers = (
+        master.frames(0x582, "2s")
+        if not cleared
+        else [text[4:] for _, text in master.heard if text.startswith("582")]
+    )
+    assert [answer[2:6] for answer in answers] == ["8160", "0010", "1810"]
+
+
 def test_an_answer_that_comes_twice_is_taken_for_the_next_one(master: Master) -> None:
     fault(master, "sdo_twice")
     assert master.read() == (1000).to_bytes(4, "little")
