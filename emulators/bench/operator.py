@@ -605,7 +605,9 @@ class Operator(Copyable):
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless a fault of this name exists."""
         if self.full_name_of(name) not in self.faults:
-            raise ValueError(f"no fault {name!r}; {near_fault(name, self.faults)}")
+            raise ValueError(
+                f"no fault {name!r}; {near_fault(name, self.faults, self._inputs.table)}"
+            )
 
     def full_name_of(self, name: str) -> str:
         """Return the full name of a fault; the name of a single node may be omitted."""

@@ -292,7 +292,9 @@ _SYNONYMS: Final = (
     (
         ("shaft_blocked", "jam_left", "motor_jammed"),
         "wheel_blocked motor_blocked blocked stall stalled motor_stalled jam jammed wheel_jammed"
-        " rotor_locked locked_rotor",
+        " rotor_locked locked_rotor shaft_stall shaft_stalled shaft_stuck shaft_jam shaft_jammed"
+        " shaft_locked wheel_stuck wheel_stall wheel_stalled motor_stall motor_jam wheel_jam"
+        " wheel_locked motor_locked motor_stuck",
     ),
     (
         ("encoder_unplugged", "encoder_unplugged_left"),
@@ -302,9 +304,26 @@ _SYNONYMS: Final = (
         ("motor_phase_open",),
         "open_phase phase_open phase_lost phase_loss motor_unplugged winding_open",
     ),
-    (("short_circuit", "short_circuit_left", "short"), "overcurrent over_current shorted"),
+    (
+        ("short_circuit", "short_circuit_left", "short"),
+        "overcurrent over_current shorted current_overload motor_short shorted_motor",
+    ),
 )
 """Faults with the words for which a device suggests the first of them that it has."""
+
+
+_INPUT_SYNONYMS: Final = (
+    (
+        ("load_nm", "ambient_c"),
+        "overheat overheated overheating overtemperature over_temperature overtemp too_hot hot heat"
+        " overload overloaded",
+    ),
+    (
+        ("supply_v",),
+        "undervoltage under_voltage low_voltage overvoltage over_voltage high_voltage",
+    ),
+)
+"""Inputs that cause an error without a fault, with the words for which they are suggested."""
 
 
 def _closest_fault(name: str, names: Iterable[str]) -> list[str]:
@@ -313,21 +332,42 @@ def _closest_fault(name: str, names: Iterable[str]) -> list[str]:
     >>> _closest_fault("heartbeat_lost", ["heartbeat_late", "heartbeat_mute"])
     ['heartbeat_mute']
     """
-    names, (device, slash, word) = list(names), name.rpartition("/")
-    there = dict[str, str]()
-    for each in names:
-        owner, _, bare = each.rpartition("/")
-        if not slash or owner == device:
-            there.setdefault(bare, each)
+    names, word = list(names), name.rpartition("/")[2]
+    there = _by_bare_name(name, names)
     same = (faults for faults, words in _SYNONYMS if word.casefold() in words.split())
     meant = (fault for faults in same for fault in faults)
     found = next((there[fault] for fault in meant if fault in there), "")
     return [found] if found else closest(name, names)
 
 
-def near_fault(name: str, names: Iterable[str]) -> str:
-    """Return a suggestion of the probable fault, or the list of the known faults."""
-    names = list(names)
+def _by_bare_name(name: str, names: Iterable[str]) -> dict[str, str]:
+    """Return the names at the device of `name`, or of all devices, by name without device."""
+    device, slash, _ = name.rpartition("/")
+    there = dict[str, str]()
+    for each in names:
+        owner, _, bare = each.rpartition("/")
+        if not slash or owner == device:
+            there.setdefault(bare, each)
+    return there
+
+
+def near_fault(name: str, names: Iterable[str], inputs: Iterable[str] = ()) -> str:
+    """Return a suggestion of the probable fault or inputs, or the list of the known faults.
+
+    Args:
+        name: the unknown name.
+        names: names of the known faults.
+        inputs: names of inputs that can be suggested.
+
+    >>> near_fault("overheat", ["cut"], ["load_nm", "ambient_c"])
+    "set the input 'load_nm' or 'ambient_c'"
+    """
+    names, word = list(names), name.rpartition("/")[2].casefold()
+    there = _by_bare_name(name, inputs)
+    for causes, words in _INPUT_SYNONYMS:
+        found = [repr(there[cause]) for cause in causes if cause in there]
+        if found and word in words.split():
+            return f"set the input {' or '.join(found)}"
     close = _closest_fault(name, names)
     return f"did you mean {close[0]!r}?" if close else near(name, names)
 

@@ -360,7 +360,9 @@ class RigState(Copyable):
         full = hands.full_name_of(fault)
         if full not in hands.faults:
             of_owner = f" of {owner}" if owner else ""
-            raise ValueError(f"no fault {fault!r}{of_owner}; {near_fault(fault, faults)}")
+            part = self.assembly.parts.get(owner)
+            inputs = (part or self.assembly).inputs.table if part or not owner else ()
+            raise ValueError(f"no fault {fault!r}{of_owner}; {near_fault(fault, faults, inputs)}")
         return full
 
     def faults_of(self, owner: str) -> dict[str, str]:

@@ -225,14 +225,23 @@ class Task(Generic[_T]):
         """Return the result of the body, or raise its exception.
 
         Raises:
-            RuntimeError: the body has not ended yet.
+            RuntimeError: the body has not ended yet, or the task was cancelled.
         """
+        __tracebackhide__ = True
         if self._error is not None:
             self._raised = True
             raise self._error
         if not self._result:
-            raise RuntimeError("the task has not ended yet")
+            raise RuntimeError(self._why_no_result())
         return self._result[0]
+
+    def _why_no_result(self) -> str:
+        if self._wait is None:
+            return "the task was cancelled, so it has no result"
+        place, done = place_of_body(self._body), self._wait.done
+        where = f": it waits at {place}" if place else ""
+        what = f" for {done}" if where and isinstance(done, LineTrigger) else ""
+        return f"the task has not ended yet{where}{what}"
 
     def check(self) -> None:
         """Raise the exception of the body, unless the result of the task was read."""

@@ -376,7 +376,11 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
         description = build.describe_device(model or rtc or "")
     except ValueError as error:
         raise Refused(str(error)) from None
-    text = format_eds(description.template.description, description.info)
+    name = "" if path == _STANDARD_OUTPUT else path.name
+    try:
+        text = format_eds(description.template.description, description.info, file_name=name)
+    except ValueError as error:
+        raise Refused(str(error)) from None
     if path == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 from traceback import walk_tb
 from types import TracebackType
@@ -13,7 +14,7 @@ import pytest
 import tickrig
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError
-from tickrig.emulators.testing.host_clock.host_code import HostHangsError
+from tickrig.emulators.testing.host_clock.host_code import HostHangsError, is_installed
 
 _PACKAGE: Final = Path(tickrig.__file__).parent
 
@@ -93,7 +94,9 @@ def _raiser(error: BaseException) -> str:
 def end_at_caller(error: BaseException) -> None:
     """Remove tickrig's frames from the end of a traceback, if a call of tickrig was refused.
 
-    They are also removed if a host waits endlessly, so that the line that waits is the last one.
+    They are also removed if a host waits endlessly, so that the line that waits is the last one. If
+    code of the user that tickrig has called raises, such as a condition, tickrig's frames between
+    the test and this code are removed.
 
     Args:
         error: the exception of the test.
@@ -108,6 +111,28 @@ def end_at_caller(error: BaseException) -> None:
     refused = isinstance(error, (TypeError, HostHangsError, *_REFUSALS))
     if refused and last and _package_of(last) not in ("_pytest", "pluggy"):
         last.tb_next = None
+    _leave_out_ours(error.__traceback__)
+
+
+def _leave_out_ours(entry: TracebackType | None) -> None:
+    """Remove tickrig's frames before the innermost frame of the user's code."""
+    entries = []
+    while entry is not None:
+        entries.append(entry)
+        entry = entry.tb_next
+    theirs = [number for number, entry in enumerate(entries) if _is_of_user(entry)]
+    if not theirs:
+        return
+    kept = [entry for entry in entries[: theirs[-1]] if _package_of(entry) != "tickrig"]
+    rest = entries[theirs[-1] :]
+    for entry, following in pairwise([*kept, rest[0]]):
+        entry.tb_next = following
+
+
+def _is_of_user(entry: TracebackType) -> bool:
+    file, package = entry.tb_frame.f_code.co_filename, _package_of(entry)
+    known = package in _LIBRARIES or package in ("tickrig", "_pytest", "pluggy")
+    return not known and not is_installed(file)
 
 
 def _package_of(entry: TracebackType) -> str:

@@ -135,7 +135,11 @@ def test_an_input_of_a_model_is_set_by_its_name() -> None:
 def test_the_eds_of_a_model_makes_the_same_device(tmp_path: Path) -> None:
     eds = tmp_path / "palette.eds"
     assert run("--model", "f-palette", "--write-eds", eds).output == ""
-    assert run("--model", "f-palette", "--write-eds", "-").stdout == eds.read_text("utf-8")
+    printed = run("--model", "f-palette", "--write-eds", "-").stdout.splitlines()
+    written = eds.read_text("utf-8").splitlines()
+    assert printed[1].startswith("FileName=")
+    assert written[1] == "FileName=palette.eds"
+    assert printed[2:] == written[2:]
     scenario = "10ms send 000#0110\n20ms set di1 1\n30ms send 610#4001140100000000\n50ms end\n"
     assert frames(play(scenario, "--model", "f-palette")) == frames(
         play(scenario, "--eds", eds, "--node-id", "16")

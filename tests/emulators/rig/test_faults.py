@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig import Bench
+from tickrig.device import make_epos
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
@@ -323,6 +324,10 @@ def test_each_synonym_suggests_a_fault_that_there_is() -> None:
         ("power_cut", "power_off"),
         ("wheel_blocked", "shaft_blocked"),
         ("heartbeat_lat", "heartbeat_late"),
+        ("shaft_stall", "shaft_blocked"),
+        ("stall", "shaft_blocked"),
+        ("jam", "shaft_blocked"),
+        ("overcurrent", "short_circuit"),
     ],
 )
 def test_a_word_of_the_field_suggests_the_fault_of_a_drive(word: str, fault: str) -> None:
@@ -331,6 +336,27 @@ def test_a_word_of_the_field_suggests_the_fault_of_a_drive(word: str, fault: str
             bench.fault(word)
         with pytest.raises(ValueError, match=f"no fault '{word}'; did you mean '{fault}'"):
             bench.clear(word)
+
+
+@pytest.mark.parametrize(
+    ("word", "inputs"),
+    [
+        ("overheat", "'left/load_nm' or 'left/ambient_c'"),
+        ("right/undervoltage", "'right/supply_v'"),
+    ],
+)
+def test_a_word_of_the_field_suggests_the_inputs_that_cause_it(word: str, inputs: str) -> None:
+    with Bench(left=make_epos(1), right=make_epos(2)) as bench:
+        for call in (bench.fault, bench.clear):
+            with pytest.raises(ValueError, match=f"no fault '{word}'; set the input {inputs}$"):
+                call(word)
+        with pytest.raises(ValueError, match=r"no fault 'hot' of left; set the input 'load_nm' or"):
+            bench["left"].fault("hot")
+    with (
+        Bench("f-palette") as bench,
+        pytest.raises(ValueError, match=r"no fault 'overheat'; known"),
+    ):
+        bench.fault("overheat")
 
 
 def test_a_word_of_the_field_suggests_the_fault_of_the_first_device_or_of_the_one_named() -> None:

@@ -46,12 +46,19 @@ class Table(Protocol):
         ...
 
 
-def write_eds(table: Table, info: object_table.DeviceInfo = _NO_INFO) -> str:
+def write_eds(
+    table: Table, info: object_table.DeviceInfo = _NO_INFO, *, file_name: str = ""
+) -> str:
     """Write the objects with their default values.
 
     Properties without a CiA 306 keyword are written as comments if needed: `MaxBytes` limits a
-    string or domain, `DefaultBytes` gives a default that no text can express. The file is named
-    after the product and dated 1970, so the same dictionary gives the same text.
+    string or domain, `DefaultBytes` gives a default that no text can express. The file is dated
+    1970, so the same dictionary gives the same text.
+
+    Args:
+        table: the objects.
+        info: vendor, product and bit rates for the sections `[FileInfo]` and `[DeviceInfo]`.
+        file_name: value of `FileName`. The default is a name made from the product name.
 
     Raises:
         ValueError: an EDS cannot hold a name or an access.
@@ -61,7 +68,7 @@ def write_eds(table: Table, info: object_table.DeviceInfo = _NO_INFO) -> str:
     >>> text.splitlines()[:2]
     ['[FileInfo]', 'FileName=device.eds']
     """
-    return "\n".join([*_head(table, info, ".eds"), *_objects(table)])
+    return "\n".join([*_head(table, info, ".eds", file_name), *_objects(table)])
 
 
 def write_dcf(
@@ -93,8 +100,10 @@ def write_dcf(
     return "\n".join([*_head(table, info, ".dcf"), *commissioning, *objects])
 
 
-def _head(table: Table, info: object_table.DeviceInfo, ending: str) -> Iterator[str]:
-    yield from ("[FileInfo]", *_file_info(info, ending), "", "[DeviceInfo]")
+def _head(
+    table: Table, info: object_table.DeviceInfo, ending: str, file_name: str = ""
+) -> Iterator[str]:
+    yield from ("[FileInfo]", *_file_info(info, ending, file_name), "", "[DeviceInfo]")
     for key, text in (
         ("VendorName", info.vendor_name),
         ("ProductName", info.product_name),
@@ -123,9 +132,10 @@ def _identity(table: Table) -> dict[int, int]:
     return {row.sub: int.from_bytes(row.default, "little") for row in table if row.index == 0x1018}
 
 
-def _file_info(info: object_table.DeviceInfo, ending: str) -> Iterator[str]:
+def _file_info(info: object_table.DeviceInfo, ending: str, file_name: str) -> Iterator[str]:
     name = _NO_WORD.sub("-", info.product_name.lower()).strip("-") or "device"
-    yield from (f"FileName={name}{ending}", "FileVersion=1", "FileRevision=1")
+    yield from (f"FileName={_name(file_name) or f'{name}{ending}'}", "FileVersion=1")
+    yield "FileRevision=1"
     if ending == ".dcf":
         yield f"LastEDS={name}.eds"
     yield from ("EDSVersion=4.0", f"Description={_name(info.product_name)}")

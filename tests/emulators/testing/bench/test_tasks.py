@@ -29,7 +29,7 @@ def test_tasks_go_on_while_a_host_waits() -> None:
     times: list[int] = []
     with Bench(Rrc()) as bench:
         task = bench.start(blink(bench, times))
-        with pytest.raises(RuntimeError, match="not ended"):
+        with pytest.raises(RuntimeError, match=r"not ended yet: it waits at .*test_tasks\.py:17$"):
             task.result()
         link = bench.link
         while link.receive(100_000):
@@ -72,6 +72,16 @@ def test_a_task_is_cancelled() -> None:
         task.cancel()
         bench.run_for("1s")
         assert (times, task.done) == ([0, 15_000], True)
+        with pytest.raises(RuntimeError, match="the task was cancelled"):
+            task.result()
+
+
+def test_a_task_that_has_not_ended_names_the_line_that_it_waits_for() -> None:
+    async def body(bench: Bench) -> None:
+        await bench.until(bench.on_line("OK:*", nth=3))
+
+    with Bench(Rrc()) as bench, pytest.raises(RuntimeError, match=r"py:\d+ for the 3rd OK:\*$"):
+        bench.start(body(bench)).result()
 
 
 def test_what_is_no_wait_of_a_bench_is_told() -> None:

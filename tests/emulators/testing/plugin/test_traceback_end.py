@@ -32,6 +32,63 @@ def test_a_refusal_is_shown_in_the_line_of_the_caller(
     result.stdout.no_fnmatch_line("*rig_thread.py*")
 
 
+UNENDED = """
+def test_one(bench):
+    async def watch():
+        await bench.until(lambda: False)
+
+    task = bench.start(watch())
+    bench.run_for("1s")
+    task.result()
+"""
+
+
+def test_a_task_that_has_not_ended_is_shown_in_the_line_that_reads_it(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    name = pytester.makepyfile(UNENDED).name
+    result = run()
+    result.assert_outcomes(failed=1)
+    message = f"E *RuntimeError: the task has not ended yet: it waits at {name}:3"
+    result.stdout.fnmatch_lines([">*task.result()", message, f"{name}:7: RuntimeError"])
+    result.stdout.no_fnmatch_line("*tasks.py*")
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        'bench.fault("cut", when=lambda: wrong(bench))',
+        'bench.wait_until(lambda: wrong(bench), "1s")',
+        "bench.start(watch(bench))",
+        "bench.run(watch(bench))",
+    ],
+)
+def test_an_error_in_a_condition_is_shown_in_lines_of_the_user(
+    pytester: pytest.Pytester, run: Run, call: str
+) -> None:
+    pytester.makeconftest(RRC)
+    text = f"""
+        def wrong(bench):
+            return bench.now_us > 1000 and None + 1
+
+        async def watch(bench):
+            await bench.until(lambda: wrong(bench))
+
+        def test_one(bench):
+            {call}
+            bench.run_for("1s")
+        """
+    name = pytester.makepyfile(text).name
+    result = run()
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([">*bench.now_us > 1000 and None + 1", f"{name}:2: TypeError"])
+    result.stdout.no_fnmatch_line("*tasks.py*")
+    result.stdout.no_fnmatch_line("*bench.py*")
+    result.stdout.no_fnmatch_line("*rig.py*")
+    run("--full-trace").stdout.fnmatch_lines(["*bench.py:*"])
+
+
 def test_all_of_it_is_shown_to_who_asks(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile(MISSPELT)
