@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tickrig import Bench, open_bench
+from tickrig.device.canopen.models.epos import dictionary
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.wire.canopen.drive import DriveState
 
@@ -82,6 +83,20 @@ def test_the_page_of_bodies_names_each_input_and_output() -> None:
         found = {name for name in names(bench) if name.startswith("body/")}
     assert found
     assert found - named_on("bodies") == set()
+
+
+def test_the_page_of_the_drive_has_the_types_and_defaults_of_its_objects() -> None:
+    page = (PAGES / "epos.md").read_text("utf-8")
+    rows = re.findall(r"^\| (\w{4})h \| ([UI])(\d+) \| ?(\d*) \|", page, re.MULTILINE)
+    assert len(rows) >= 20
+    objects = dictionary()
+    for index, kind, bits, default in rows:
+        (entry,) = (each for each in objects.description if each.index == int(index, 16))
+        assert entry.data_type.name == f"{'UNSIGNED' if kind == 'U' else 'INTEGER'}{bits}", index
+        if default:
+            assert int.from_bytes(entry.default, "little", signed=kind == "I") == int(default), (
+                index
+            )
 
 
 def test_the_page_of_the_drive_has_the_names_of_its_states() -> None:
