@@ -377,10 +377,7 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     except ValueError as error:
         raise Refused(str(error)) from None
     name = "" if path == _STANDARD_OUTPUT else path.name
-    try:
-        text = format_eds(description.template.description, description.info, file_name=name)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    text = format_eds(description.template.description, description.info, file_name=name)
     if path == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return

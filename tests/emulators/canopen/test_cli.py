@@ -140,6 +140,9 @@ def test_the_eds_of_a_model_makes_the_same_device(tmp_path: Path) -> None:
     assert printed[1].startswith("FileName=")
     assert written[1] == "FileName=palette.eds"
     assert printed[2:] == written[2:]
+    odd = tmp_path / "palette ;1.eds"
+    assert run("--model", "f-palette", "--write-eds", odd).output == ""
+    assert odd.read_text("utf-8").splitlines() == printed
     scenario = "10ms send 000#0110\n20ms set di1 1\n30ms send 610#4001140100000000\n50ms end\n"
     assert frames(play(scenario, "--model", "f-palette")) == frames(
         play(scenario, "--eds", eds, "--node-id", "16")

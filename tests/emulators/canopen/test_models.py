@@ -41,8 +41,9 @@ def default_of(entry: EntryDescription) -> object:
 def test_the_shipped_eds_is_what_the_model_writes(model: EmulatedModel) -> None:
     description = model.describe()
     text = (SHIPPED / f"{model.name}.eds").read_text("utf-8")
-    again = f"canopen-slave-emu --model {model.name} --write-eds examples/eds/{model.name}.eds"
-    assert text == write_eds(description.template.description, description.info), (
+    name = f"{model.name}.eds"
+    again = f"canopen-slave-emu --model {model.name} --write-eds examples/eds/{name}"
+    assert text == write_eds(description.template.description, description.info, file_name=name), (
         f"write it again: {again}"
     )
 

@@ -58,7 +58,8 @@ def write_eds(
     Args:
         table: the objects.
         info: vendor, product and bit rates for the sections `[FileInfo]` and `[DeviceInfo]`.
-        file_name: value of `FileName`. The default is a name made from the product name.
+        file_name: value of `FileName`. If it is empty, or an EDS cannot hold it, `FileName` is made
+            from the product name.
 
     Raises:
         ValueError: an EDS cannot hold a name or an access.
@@ -134,8 +135,8 @@ def _identity(table: Table) -> dict[int, int]:
 
 def _file_info(info: object_table.DeviceInfo, ending: str, file_name: str) -> Iterator[str]:
     name = _NO_WORD.sub("-", info.product_name.lower()).strip("-") or "device"
-    yield from (f"FileName={_name(file_name) or f'{name}{ending}'}", "FileVersion=1")
-    yield "FileRevision=1"
+    given = file_name if _fits_a_line(file_name) else ""
+    yield from (f"FileName={given or f'{name}{ending}'}", "FileVersion=1", "FileRevision=1")
     if ending == ".dcf":
         yield f"LastEDS={name}.eds"
     yield from ("EDSVersion=4.0", f"Description={_name(info.product_name)}")

@@ -35,7 +35,9 @@ def build(project: Project) -> dict[str, str]:
     stem = snake_name(profile.type_name)
     return {
         f"{stem}.eds": write_eds(
-            rtc_canopen.object_table(profile), rtc_canopen.device_info(profile)
+            rtc_canopen.object_table(profile),
+            rtc_canopen.device_info(profile),
+            file_name=f"{stem}.eds",
         ),
         f"{stem}_od.h": write_header(profile),
         f"{stem}.yaml": _write_fragment(project),

@@ -98,8 +98,9 @@ def test_the_eds_is_what_the_device_of_the_skeleton_writes(tmp_path: Path, text:
     project = written(tmp_path, text)
     (skeleton,) = tmp_path.glob("*.py")
     described = describe_rtc(f"{skeleton}:{project.profile.type_name}")
-    eds = write_eds(described.template.description, described.info)
-    assert eds == skeleton.with_suffix(".eds").read_text("utf-8")
+    file = skeleton.with_suffix(".eds")
+    eds = write_eds(described.template.description, described.info, file_name=file.name)
+    assert eds == file.read_text("utf-8")
 
 
 @each_profile
