@@ -87,14 +87,17 @@ def place_of(file: str, line: int) -> str:
     return f"{path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path}:{line}"
 
 
-def host_place(frame: FrameType | None) -> str:
-    """Return file and line of the innermost host code that has led to a frame; empty if none."""
+def host_places(frame: FrameType | None) -> list[str]:
+    """Return the lines of host code that have led to a frame, from the innermost to the test."""
+    places: list[str] = []
     while frame is not None:
-        file = frame.f_code.co_filename
-        if is_host(frame.f_globals.get("__name__") or "", file):
-            return place_of(file, frame.f_lineno)
+        module, file = frame.f_globals.get("__name__") or "", frame.f_code.co_filename
+        if places and module.startswith("_pytest."):
+            break  # what lies beyond called pytest, and not the test
+        if is_host(module, file):
+            places.append(place_of(file, frame.f_lineno))
         frame = frame.f_back
-    return ""
+    return places
 
 
 def place_of_body(body: object) -> str:

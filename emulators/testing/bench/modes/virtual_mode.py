@@ -21,7 +21,11 @@ from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.mode import Address, EmulatedMode
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.bench.tasks import DAY_US
-from tickrig.emulators.testing.host_clock.host_code import HostHangsError, HostTimeError, host_place
+from tickrig.emulators.testing.host_clock.host_code import (
+    HostHangsError,
+    HostTimeError,
+    host_places,
+)
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import Object
@@ -64,8 +68,11 @@ _MOST_CAUGHT: Final = 100
 """How often a host may catch the error; then it gets one that `except Exception` does not catch."""
 
 
+_CALLERS: Final = 4
+"""Largest number of lines in the message that called the line that waits."""
+
 _ENDLESS: Final = (
-    "and the test has called neither run_for nor wait_until since. Give the host a time-out, or"
+    "and the test has called neither run_for nor wait_until since. Give the loop a time-out, or"
     ' raise the limit: Bench(..., limit="7200s"), --bench-limit 7200s, or bench_limit in the'
     ' configuration file; "none" switches it off'
 )
@@ -148,8 +155,10 @@ class _WaitLimit(HostLimit):
             self._refuse(now_us, f"has asked the bench {_MOST_GETS} times at one instant")
 
     def _refuse(self, now_us: int, what: str, where: Callable[[], str] | None = None) -> NoReturn:
-        place = (where() if where else host_place(sys._getframe())) or "a host"
-        text = f"{place}: the host {what}, up to {format_time(now_us)} s, {_ENDLESS}"
+        place, *callers = [where()] if where else host_places(sys._getframe()) or ["a host"]
+        called = f", called from {', '.join(callers[:_CALLERS])}" if callers else ""
+        place = place or "a host"
+        text = f"{place}: the host {what}, up to {format_time(now_us)} s{called}, {_ENDLESS}"
         self.refused = self.refused or text
         self._caught += 1
         if self._caught > _MOST_CAUGHT:

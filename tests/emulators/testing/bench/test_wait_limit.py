@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import re
 import time
 from collections.abc import Callable
 from functools import partial
@@ -129,18 +130,20 @@ def hanging(bench: Bench, host: Callable[[Bench], object]) -> str:
 def test_a_host_that_polls_for_ever_is_ended(
     device: Callable[[], Any], host: Callable[[Bench], object]
 ) -> None:
-    bench = Bench(device(), limit="60s")
-    text = hanging(bench, host)
+    benches = [Bench(device(), limit="60s") for _ in range(2)]
+    text, again = (hanging(bench, host) for bench in benches)
     lines, first = inspect.getsourcelines(host)
     file, _, rest = text.partition(":")
     line, _, _ = rest.partition(":")
     assert file.endswith("test_wait_limit.py")
     assert first < int(line) < first + len(lines)
     assert ": the host has waited for 60.000000 s of virtual time" in text
-    assert f", up to {bench.now_us / 1e6:.6f} s, and the test has called neither" in text
+    now_us = benches[0].now_us
+    assert f", up to {now_us / 1e6:.6f} s, " in text
+    assert ", and the test has called neither" in text
     assert 'Bench(..., limit="7200s"), --bench-limit 7200s, or bench_limit' in text
-    assert 60_000_000 <= bench.now_us < 65_000_000
-    assert hanging(Bench(device(), limit="60s"), host) == text
+    assert 60_000_000 <= now_us < 65_000_000
+    assert again == text
 
 
 def test_an_hour_is_the_limit_of_a_host_unless_another_is_given(tmp_path: Path) -> None:
@@ -220,6 +223,36 @@ def test_a_wait_that_hears_other_frames_is_one_wait() -> None:
         assert not network.wait(lambda: False, 150)
         with pytest.raises(HostHangsError):
             bus.recv(150)
+
+
+def wait_for(bit: int, bus: can.BusABC) -> None:
+    while not ask(bus) & bit:
+        pass
+
+
+def ask(bus: can.BusABC) -> int:
+    bus.recv(0.1)
+    return 0
+
+
+def test_the_lines_that_called_the_waiting_line_are_named() -> None:
+    with (
+        Bench(make_f_palette(5), limit="10s") as bench,
+        bench.can_bus() as bus,
+        pytest.raises(HostHangsError) as caught,
+    ):
+        wait_for(1, bus)
+    lines = [
+        inspect.getsourcelines(each)[1] + after
+        for each, after in (
+            (ask, 1),
+            (wait_for, 1),
+            (test_the_lines_that_called_the_waiting_line_are_named, 6),
+        )
+    ]
+    waits, loops, test = (rf"[^ ,:]*test_wait_limit\.py:{line}" for line in lines)
+    called = rf"{waits}: the host .*, called from {loops}, {test}, and the"
+    assert re.match(called, str(caught.value)), str(caught.value)
 
 
 def read_clock() -> None:

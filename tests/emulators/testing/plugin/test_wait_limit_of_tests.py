@@ -58,8 +58,9 @@ def test_a_host_that_polls_for_ever_fails_its_test_at_its_line(
         [
             '>*while b"ready" not in port.readline():',
             "E *HostHangsError: my_host.py:4: the host has waited for 60.000000 s of virtual time, "
-            "up to 6?.?????? s, and the test has called neither run_for nor wait_until since. Give "
-            'the host a time-out, or raise the limit: Bench(..., limit="7200s"), --bench-limit '
+            "up to 6?.?????? s, called from test_a_host_*.py:5, and the test has called neither "
+            "run_for nor wait_until since. Give "
+            'the loop a time-out, or raise the limit: Bench(..., limit="7200s"), --bench-limit '
             '7200s, or bench_limit in the configuration file; "none" switches it off',
             "my_host.py:4: HostHangsError",
             "my_host.py:4: the host has waited for 60.000000 s *",
