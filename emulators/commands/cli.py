@@ -123,7 +123,10 @@ _COMMANDS: Final = {
         "Operate and watch the emulator whose control socket is SOCKET.",
     ),
     "demo": (f"{_HERE}.cli:demo", "Show an emulated device and a host at work."),
-    "doctor": (f"{_HERE}.cli:doctor", "See what of this machine tickrig can use, and what to do."),
+    "doctor": (
+        f"{_HERE}.cli:doctor",
+        "Check what tickrig can use on this machine, and show what to do.",
+    ),
     "emu": (f"{_HERE}.emu_cli:emu", "Emulate a built-in device or one of an installed package."),
     "init": (
         f"{_TESTING}.init_cli:init",
