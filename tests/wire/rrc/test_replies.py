@@ -29,6 +29,12 @@ def test_what_was_written_is_read_back(reply: Reply) -> None:
     assert parse_reply(reply.encode()[:-1]) == reply
 
 
+def test_a_status_has_signed_percentages_and_counts() -> None:
+    status = StatusA(100, -1, -100, 0, 10, 1, 15, 2, 0)
+    assert status.encode()[:-2] == b"SA:64FF9C00A1F20"
+    assert parse_reply(status.encode()[:-1]) == status
+
+
 @given(st.binary() | st.binary(min_size=14, max_size=14).map(b"SA:".__add__))
 def test_noise_is_a_wire_error_or_a_reply(line: bytes) -> None:
     try:
