@@ -196,12 +196,15 @@ class Unanswered(list[Object]):
             self.append(at)
 
     def hear(self, at: Object) -> None:
-        """Drop the requests before those about the object. The server no longer answers them."""
+        """Drop the requests before those about an object that the server has answered.
+
+        The server no longer answers the dropped requests.
+        """
         if at in self:
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
-        """Return an object whose answer proves that no answer about `at` can follow.
+        """Return an object to read, whose answer proves that no answer about `at` can follow.
 
         The latest request is preferred, so that a node that is gone gets requests for the same
         fence. If all fences are open, the oldest request is dropped. A server that answers at this
@@ -218,7 +221,7 @@ class Unanswered(list[Object]):
 
 
 class Dialogue:
-    """The dialogue with one node. The dialogue sends frames, and never blocks.
+    """The dialogue of a host with one node. The dialogue sends frames, and never blocks.
 
     Keep the dialogue as long as you communicate with the node, because only the dialogue knows
     which requests the server may still answer.

@@ -14,7 +14,7 @@ MOST_BYTES: Final = 32_000_000
 
 
 def read_eds_bytes(path: Path) -> bytes:
-    """Read a file.
+    """Return the bytes of an EDS file.
 
     OSError is raised if the file cannot be read. EdsError is raised if the file is too large for an
     EDS.

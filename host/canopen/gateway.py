@@ -119,7 +119,7 @@ def _sequence_of(line: str) -> int:
 
 
 def parse_request(line: str) -> _GatewayRequest | None:
-    """Read a line. Return None for an empty line and for a comment.
+    """Parse a command line. Return None for an empty line and for a comment.
 
     Raises:
         GatewayError: the line is not a command.

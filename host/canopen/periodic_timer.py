@@ -33,7 +33,7 @@ class PeriodicTimer:
     def advance(self, now_us: int) -> bool:
         """Start the next period if the current period has ended. Return whether it has ended.
 
-        The end of the next period is the same as without a pause.
+        A pause does not shift the ends of later periods.
         """
         if now_us < self.due_us:
             return False

@@ -120,7 +120,7 @@ class BusSlave:
         device: the device that the EDS or DCF describes.
         identity: identity that the master checks at boot-up.
         writes: concise DCF, in the order in which the master writes it.
-        pdos: all PDOs of the dictionary after `writes`, RPDOs first.
+        pdos: all PDOs of the dictionary as they are after `writes`, RPDOs first.
         master_pdos: PDOs that enter the master's own dictionary, TPDOs of the slave first.
         heartbeat_producer_ms: producer heartbeat time of the slave after the writes, or 0 for no
             heartbeat.

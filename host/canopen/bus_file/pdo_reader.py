@@ -246,7 +246,7 @@ def _mapping(sheet: Sheet, index: int) -> Iterator[MappedObject]:
 
 
 def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
-    """Return all PDOs of a slave after the writes, RPDOs first."""
+    """Return all PDOs of a slave as they are after the writes, RPDOs first."""
     written = writes.values()
 
     def value(index: int, sub: int, default: int = 0) -> int:

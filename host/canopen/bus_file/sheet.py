@@ -51,7 +51,7 @@ class Sheet:
         return index in self._rows
 
     def pdos(self, first: int) -> list[int]:
-        """Return the existing communication parameters.
+        """Return the indices of the communication parameters that exist, sorted.
 
         `first` is the index of the parameter of PDO 1.
         """
@@ -74,7 +74,7 @@ class Sheet:
         return int.from_bytes(data, "little", signed=row.signed)
 
     def beside(self, index: int) -> str:
-        """Return where the object of a missing entry is described, or that there is none."""
+        """Return the line that describes an object, or a text that the file lacks the object."""
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
     def place(self, index: int, sub: int | None = None) -> FilePlace:

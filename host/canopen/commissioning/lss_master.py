@@ -50,7 +50,7 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused or did not answer, or several slaves answered a question to one slave.
+    """A slave refused or did not answer, or several slaves answered a request to one slave.
 
     Attributes:
         command: command that failed, or None if several commands failed.
@@ -80,7 +80,7 @@ class LssMaster:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Put all slaves into waiting before and after the block, also after errors."""
+        """Put all slaves into the state waiting before and after the block, also after errors."""
         self.switch_all(LssMode.WAITING)
         try:
             yield
@@ -162,7 +162,7 @@ class LssMaster:
         return self._command(message(LssCommand.INQUIRE_NODE_ID))[1]
 
     def count(self) -> int:
-        """Return how many slaves in configuration answer, or 0 if no slave supports the question.
+        """Return how many slaves in configuration answer, or 0 if no slave supports the request.
 
         A fastscan finds slaves with the same address as one slave. If these slaves answer at the
         same moment, their answers are one frame on the bus and count as one answer.

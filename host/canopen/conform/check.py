@@ -264,7 +264,7 @@ STIMULUS: Final = "stimulus"
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One question to a node.
+    """One conformance check of a node.
 
     Attributes:
         id: name of the check, such as `NMT-03`, or `OD-2000.00-type` for checks of an object of the

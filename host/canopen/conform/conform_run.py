@@ -99,13 +99,13 @@ class _StrayHeartbeat:
             self.stamps = [at_us for at_us, frame in heard if matches(self._pattern, str(frame))]
 
     def compare(self, period_ms: int | None) -> None:
-        """Compare the heartbeat with 1017h. The value is None if the node has no 1017h."""
+        """Compare the heartbeat with the value of 1017h, which is None if the node has no 1017h."""
         self._period_ms = period_ms
         if not period_ms:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Listen for the heartbeat after the run.
+        """Listen after the run, and report the heartbeat if it is missing.
 
         A heartbeat that is not set by 1017h cannot be switched on again.
         """

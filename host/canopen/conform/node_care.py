@@ -77,7 +77,7 @@ class KnownState:
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Read objects that are not known yet. Objects that cannot be read are not restored.
+        """Read objects whose values are unknown. Objects that cannot be read are not restored.
 
         Args:
             addresses: addresses of the objects.

@@ -192,16 +192,16 @@ def object_checks(
 
     - in every object, the sub-indices between and after the described ones, and FEh and FFh
     - over all objects together, each sub-index up to FFh once
-    - after every row of objects, the next index
+    - after every series of consecutive indices, the next index
 
     Args:
         device: device that the EDS describes.
         node_id: node-ID of the node, 1..127, for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
         never: indices that are never written.
-        may_choose: function that returns whether a check of a group may be selected, if the id of
-            the check continues with a text. Other checks may be omitted, which does not change the
-            remaining checks.
+        may_choose: function that returns whether a check may be selected. Its arguments are the
+            group of the check, and the beginning of its id after the group. Other checks may be
+            omitted, which does not change the remaining checks.
     """
     maker, checks = _Maker(node_id, allow, never), list[check.Check]()
     entries = sorted(device.entries, key=attrgetter("key"))

@@ -66,7 +66,7 @@ class Permission:
         self._all_configured = False
 
     def check(self, frame: CanFrame) -> None:
-        """Return if a frame may be sent. Raise an error otherwise.
+        """Check that a frame may be sent. Raise an error if it may not.
 
         Raises:
             NotAllowed: the level does not allow the frame.
@@ -87,7 +87,7 @@ class Permission:
             self._check_lss(frame.data)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
-        """Return if an object may be written. Raise NotAllowed otherwise.
+        """Check that an object may be written. Raise NotAllowed if it may not.
 
         Args:
             index: index of the object.

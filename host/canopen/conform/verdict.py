@@ -32,7 +32,7 @@ class Direction(StrEnum):
 
 
 class FrameLine(NamedTuple):
-    """A line of the evidence.
+    """A line of the evidence: a frame on the bus, or a remark of the tester.
 
     Attributes:
         at_us: bus time since the start of the run.

@@ -44,7 +44,7 @@ class _Fixed:
     origins: tuple[int, ...]
 
     def before(self, one: RuleFinding) -> RuleFinding:
-        """Return the remaining findings with their lines in the original file."""
+        """Return a remaining finding with its line in the original file."""
         return replace(one, line=_origin(self.origins, one.line))
 
 

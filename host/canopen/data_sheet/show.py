@@ -60,7 +60,7 @@ _CAN_ID: Final = 0x1FFF_FFFF
 
 
 def head(document: Document) -> dict[str, Any]:
-    """Return device, identity and capabilities of the head."""
+    """Return names, identity, capabilities and object counts of a device, each by its label."""
     info = document.device.info
     return {
         "vendor": info.vendor_name,

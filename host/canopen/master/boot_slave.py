@@ -57,7 +57,7 @@ from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 
 class BootStatus(Enum):
-    """The error status by letter. `BOOTED` has no letter."""
+    """The error status of a boot-up, by its letter. `BOOTED` has no letter."""
 
     BOOTED = ""
     NOT_LISTED = "A"

@@ -151,7 +151,7 @@ class CanopenMaster(Closing):
                 operation.close()
 
     def explain(self, name: str | int) -> str:
-        """Return the latest boot-up of a slave and its losses, line by line.
+        """Return a text about the latest boot-up and the losses of a slave, line by line.
 
         The lines on the boot-up contain the requests, the answers and the outcome. Losses, and
         messages after a loss, are listed in the order of time, before or after the boot-up.

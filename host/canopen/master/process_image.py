@@ -22,7 +22,7 @@ _SYNC_ACYCLIC: Final = 0
 
 
 class ProcessImage:
-    """Values by index and sub-index. A value is 0 until it is received or written.
+    """Values in the PDOs of a slave, by index and sub-index; 0 until received or written.
 
     An RPDO of the slave is sent when an object in it is written. A synchronous RPDO is sent with
     each n-th SYNC. As in Lely's master, objects that have not been written are 0.

@@ -116,7 +116,7 @@ class BoundObject:
 
 @dataclass(frozen=True, slots=True)
 class BoundPlace:
-    """A place in the dictionary at which the node has no object."""
+    """An index and sub-index at which the node has no object."""
 
     index: int
     sub: int

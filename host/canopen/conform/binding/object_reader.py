@@ -67,7 +67,7 @@ class ObjectReader:
         return number_of(answer) if isinstance(answer, bytes) else None
 
     def has_nothing(self, index: int, sub: int) -> bool:
-        """Return whether the node refuses to read a place, with any abort code.
+        """Return whether the node refuses to read an index and sub-index, with any abort code.
 
         Raises:
             SdoTimeout: the node has stopped answering.

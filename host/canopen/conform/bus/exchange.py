@@ -62,9 +62,9 @@ _Line = tuple[int, Direction, CanFrame | str]
 
 
 class Evidence:
-    """The lines of one attempt at a check.
+    """The frames and remarks of one attempt at a check, as lines of text.
 
-    If there are many, only the first and last lines are kept.
+    If there are many lines, only the first and the last ones are kept.
 
     Frames are formatted only when the lines are read.
     """
@@ -179,7 +179,7 @@ class _Allowance:
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count a frame of the tester, or an answer to a frame of the tester."""
+        """Count the bits of a frame of the tester, or of an answer to such a frame."""
         bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
         self.from_us = max(self.from_us, now_us - _WINDOW_US) + bits / self._bits_us
 
@@ -196,7 +196,7 @@ class _ForeignLoad:
         self._window = self._bits = 0
 
     def add(self, at_us: int, frame: CanFrame) -> bool:
-        """Count a frame. Return True if the bus is too loaded to judge the node."""
+        """Count the bits of a frame. Return True if the bus is too loaded to judge the node."""
         window = at_us // _WINDOW_US
         if window != self._window:
             self._window, self._bits = window, 0
@@ -257,7 +257,8 @@ class BusExchange:
 
     Attributes:
         evidence: the evidence of the running check.
-        disturbances: reasons why the running check cannot fail, without duplicates.
+        disturbances: reasons to make the running check inconclusive instead of failed, without
+            duplicates.
         crashes: reasons why the running check fails in any case, without duplicates.
         boots: number of boot-up messages that the node has sent since the start of the run.
         others: node-IDs of other nodes seen on the bus. 0 stands for frames that belong to no node.

@@ -27,7 +27,7 @@ _POWER_OFF_MS: Final = 200
 
 
 class StepPlayer:
-    """Player for bound steps.
+    """Player that performs the steps of a check after its names have become numbers.
 
     Args:
         exchange: bus of the node.

@@ -61,7 +61,9 @@ def report_junit(
     baseline: Baseline = NONE_KNOWN,
     show: overview.ShowFrames = overview.plain_frames,
 ) -> str:
-    """Return the JUnit report. A known failure is skipped. A check without a verdict is an error.
+    """Return the JUnit report.
+
+    A known failure is reported as skipped, a check without a verdict as an error.
 
     Args:
         report: report of the run.

@@ -32,7 +32,9 @@ _GROUP: Final = re.compile(r"\(.*\)")
 def issue_text(
     report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the page. It contains requirement, answer, frames and a script for each failure.
+    """Return a page with the failures of a report.
+
+    For each failure it contains the requirement, the answer, the frames and a script.
 
     Args:
         report: report of the run.

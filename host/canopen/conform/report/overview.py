@@ -56,7 +56,7 @@ _HINTS: Final[Mapping[str, str]] = {
 
 
 def hint(result: Result) -> str:
-    """Return a hint where to look, without a full stop; empty if there is no hint."""
+    """Return a hint where the cause may be, without a full stop; empty if there is no hint."""
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:
             return "the node: it no longer answers; switch it off and on, then run the check alone"
@@ -74,7 +74,7 @@ _DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
 
 
 def plain_frames(lines: Sequence[FrameLine]) -> list[str]:
-    """Format lines with the bytes of frames only."""
+    """Format lines of the evidence, without the meanings of the frames."""
     return [plain_frame(line) for line in lines]
 
 
@@ -119,9 +119,9 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
-    """Return the lines of a check.
+    """Return the evidence of a check as lines of text.
 
-    The lines of the first attempt come before them if they differ.
+    The lines of the first attempt come before those of the second, if the attempts differ.
     """
     if first is None:
         return show(outcome.evidence)
@@ -177,7 +177,7 @@ def counts_text(counts: dict[CheckVerdict, int]) -> str:
 
 
 def by_group(report: Report) -> list[_GroupRow]:
-    """Return the groups in the order in which they first occur."""
+    """Return a table row for each group, in the order in which the groups first occur."""
     return _rows(report, lambda result: result.check.group)
 
 
@@ -194,9 +194,9 @@ def unwell(report: Report) -> list[Result]:
 
 
 def causes(results: Iterable[Result]) -> list[list[Result]]:
-    """Group object checks that fail in the same way.
+    """Put object checks that fail in the same way into one list.
 
-    One check stands for all checks of its kind.
+    Each other check gets a list of its own.
     """
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):

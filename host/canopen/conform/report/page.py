@@ -35,7 +35,7 @@ _MOST_OPEN: Final = 12
 def html_page(
     report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the page. The same run gives the same bytes.
+    """Return the report as an HTML page. The same run gives the same bytes.
 
     Args:
         report: report of the run.

@@ -18,7 +18,7 @@ _Object = dict[str, object]
 
 
 def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return the report. The same run gives the same bytes.
+    """Return the report as JSON. The same run gives the same bytes.
 
     Args:
         report: report of the run.

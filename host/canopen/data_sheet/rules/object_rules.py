@@ -53,7 +53,10 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 
 
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Compare SubNumber with the existing sub-indices. A missing sub-index stays visible."""
+    """Compare SubNumber with the existing sub-indices.
+
+    If a sub-index seems to be missing, SubNumber is not fixed, so that this stays visible.
+    """
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)

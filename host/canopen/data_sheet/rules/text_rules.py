@@ -23,7 +23,7 @@ _BEHIND_WORD: Final = re.compile(r"(?<!\s)\s*+(?:[#;]|//).*$")
 
 
 def encoding(document: Document) -> Iterator[RuleFinding]:
-    """Find deviations from ASCII without a byte order mark."""
+    """Find encodings and characters other than plain ASCII, and a byte order mark."""
     edit = Edit(0, EditPlace.ENCODING)
     if document.encoding.startswith("utf-16"):
         yield document.found("utf-16", "the file is UTF-16, ASCII was allowed", "", 0, edit)
@@ -60,7 +60,7 @@ def line_ends(document: Document) -> Iterator[RuleFinding]:
 
 
 def titles(document: Document) -> Iterator[RuleFinding]:
-    """Find titles with another spelling, and unknown sections."""
+    """Find section titles that CiA 306 spells differently, and unknown sections."""
     for line in document.file.lines:
         if not line.title or document.file.is_xml:
             continue
@@ -83,7 +83,7 @@ def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
 
 
 def keywords(document: Document) -> Iterator[RuleFinding]:
-    """Find unknown keywords, and keywords with another spelling."""
+    """Find unknown keywords, and keywords that CiA 306 spells differently."""
     if document.file.is_xml:
         return
     for line in document.file.lines:

@@ -158,7 +158,7 @@ def _text(limit: int | float | None) -> str:
 
 
 def of_reader(document: Document) -> Iterator[RuleFinding]:
-    """Yield the findings of the reader, with the edits that fix them."""
+    """Yield the findings of the EDS reader, with the edits that fix them."""
     file = document.file
     by_line = {line.number: line for line in file.lines}
     for finding in (*file.errors, *file.warnings):

@@ -178,7 +178,7 @@ class DriveDriver:
     Args:
         settings: settings of the axis.
         image: values in PDOs. All other values are transferred by SDO.
-        talk: function that takes SDO scripts for the node.
+        talk: function that is called with each SDO script to run with the node.
 
     Attributes:
         name: name of the joint.

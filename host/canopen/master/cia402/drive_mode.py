@@ -119,7 +119,7 @@ class DriveMode:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the set-point. Return whether it exists.
+        """Write the set-point. Return whether there is one.
 
         Without a set-point, the drive is halted.
         """
