@@ -53,7 +53,7 @@ class BusFileNotes:
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
-        """All findings in line order, without those that follow from another one in the same line."""
+        """All findings in line order, except those that follow from another one in their line."""
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}
         told = (

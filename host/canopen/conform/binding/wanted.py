@@ -80,7 +80,8 @@ class WantedObject(NamedTuple):
         access: required access as a mask of bits, and the values of these bits.
         kinds: numbers of the allowed data types, or None for any.
         limited: whether the data type must have values beyond both limits.
-        at: index and sub-index that the object must have, or None. If it is set, the other criteria do not apply.
+        at: index and sub-index that the object must have, or None. If it is set, the other criteria
+            do not apply.
         lengths: allowed lengths of the value in bytes.
     """
 

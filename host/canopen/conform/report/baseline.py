@@ -85,7 +85,7 @@ class Baseline:
         )
 
     def ends_with(self, report: verdict.Report) -> int:
-        """Return the exit status of the command. If the run ended early, it depends on the reason."""
+        """Return the exit status of the command. If the run ended early, the reason decides."""
         if report.aborted and not report.absent:
             return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED
         return self.exit_status(report)
