@@ -304,7 +304,7 @@ class OmniParameters(Immutable):
 
 @dataclass(slots=True)
 class OmniBody(Copyable):
-    """Three wheels that follow their commands with a time constant, without slip.
+    """A body on three wheels that follow their commanded speeds with a time constant, without slip.
 
     Not emulated: rollers, slip, mass, encoders, the driver.
 

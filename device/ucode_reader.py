@@ -149,7 +149,7 @@ _DIRTY_SHARE: Final = 0.5
 
 
 class UcodeReader(Copyable):
-    """A reader; a `Device[bytes]`.
+    """A reader of ucodes; a `Device[bytes]`.
 
     The reader receives in rounds of 100 ms. At the end of each round it sends a line for each
     received marker, with the nearest marker first and at most six lines. Then it sends a line that

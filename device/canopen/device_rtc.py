@@ -172,7 +172,7 @@ class CanopenComponent(DeviceComponent):
             raise ValueError(f"{cls.__name__}: {error}") from None
 
     def error_check(self) -> Result:
-        """Check the device once a period while Inactive; an error leads to Error."""
+        """Check the device once a period while Inactive; an error leads to the state Error."""
 
 
 class CanopenEcho(CanopenComponent):
@@ -421,16 +421,16 @@ def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
 
 
 class DeviceRtc(Application):
-    """Runs a component with the NMT state of its node (NEDO report, 3.4.43.3, Fig. 110).
+    """Runs a component whose state follows the NMT state of its node.
 
-    Callbacks take no time. The periodic callback runs for the first time one period after the
+    (NEDO report, 3.4.43.3, Fig. 110.) Callbacks take no time. The periodic callback runs for the first time one period after the
     component has entered the state.
 
     Not emulated: service ports, configuration sets, several components on one node.
 
     Args:
         node: the slave, whose dictionary is the dictionary of the component.
-        slot: place of the application in the order of a tick.
+        slot: position of the application in the order in which services act in a tick.
         kind: class of the component.
 
     Attributes:

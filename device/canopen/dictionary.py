@@ -232,7 +232,7 @@ class Entry(Part):
             self.guard(self, self.data_type.decode(data))
 
     def download(self, data: bytes) -> None:
-        """Write the value over the bus; SdoAbort if access, size, range or the owner forbids it."""
+        """Write the value over the bus; raise SdoAbort if access, size, range or owner forbid."""
         self.check_writable()
         self.check_size(len(data))
         value = self.data_type.decode(data)
@@ -390,7 +390,7 @@ class Dictionary(Part):
         return entry
 
     def find(self, index: int, sub: int = 0) -> Entry | None:
-        """Look an entry up.
+        """Look up an entry.
 
         Args:
             index: index of the object, 0x0000..0xFFFF.
@@ -470,7 +470,7 @@ _NOT_EMCY: Final = ~(INVALID | CAN_ID_MASK)
 
 
 def is_valid(cob_id: int) -> bool:
-    """Return whether the object exists: bit 31 is 0 (EMCY, SDO)."""
+    """Return whether a COB-ID of EMCY or SDO is valid: bit 31 is 0."""
     return not cob_id & INVALID
 
 

@@ -511,7 +511,7 @@ class SdoServer(Part):
         self.due_us = self.node.now_us + self._timeout_us
 
     def go_on_otherwise(self, request: bytes, specifier: int) -> None:
-        """Handle a request that is not the expected segment; SdoAbort on a wrong toggle bit."""
+        """Handle a request that is not the expected segment; wrong toggle bits raise SdoAbort."""
         if request[0] & SPECIFIER == specifier:
             raise SdoAbort(AbortCode.TOGGLE_BIT)
         self.initiate(request)

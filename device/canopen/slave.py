@@ -119,7 +119,7 @@ class Service(Copyable):
 
     Attributes:
         node: slave that the service belongs to.
-        slot: place of the service in the order of a tick.
+        slot: position of the service in the order in which services act in a tick.
         asked_us: time at which `tick` is due, or `NEVER` if it is not scheduled. `schedule` sets
             this time.
     """
@@ -501,7 +501,7 @@ class CanopenSlave(Copyable):
         """Schedule the `tick` of a service by its slot.
 
         Args:
-            slot: place of the service in the order of a tick.
+            slot: position of the service in the order in which services act in a tick.
             due_us: time of the call, or `NEVER` for no call.
         """
         self.await_tick(self.services[slot], due_us)

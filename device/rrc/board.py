@@ -257,7 +257,7 @@ class PowerSequence:
 
     @property
     def waiting(self) -> bool:
-        """Whether a fault is present and time decides what it does."""
+        """Whether a fault is present that has not lasted long enough to be detected."""
         return bool(self._faults)
 
     def due_tick(self, state: RrcState) -> int:

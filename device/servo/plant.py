@@ -29,15 +29,16 @@ _Matrix = list[list[float]]
 
 @dataclass(frozen=True, slots=True)
 class Discretisation(Immutable):
-    """One control step of winding and shaft as rows of numbers.
+    """One control step of winding and shaft, as rows of coefficients.
 
-    A step either leads the current to its demand or applies a constant voltage. The rows for a led
-    current multiply (current before, speed before, current after, torque). The rows for a constant
-    voltage multiply (current before, speed before, voltage, torque).
+    A step either controls the current to its demand or applies a constant voltage. The rows for a
+    controlled current multiply (current before, speed before, current after, torque). The rows for
+    a constant voltage multiply (current before, speed before, voltage, torque).
 
     Attributes:
-        speed: row for the speed after the step with a led current, in rad/s.
-        angle: row for the angle by which the shaft turns in the step with a led current, in rad.
+        speed: row for the speed after the step with a controlled current, in rad/s.
+        angle: row for the angle by which the shaft turns in the step with a controlled current, in
+            rad.
         voltage: row for the constant voltage that leads to a given current after the step, in V.
         current_u: row for the current after the step with a constant voltage, in A.
         speed_u: row for the speed after the step with a constant voltage, in rad/s.
@@ -210,7 +211,7 @@ class Plant(Part):
 
     @property
     def rows(self) -> tuple[Row, Row]:
-        """Coefficients of speed and angle after a step with led current."""
+        """Coefficients of speed and angle after a step with a controlled current."""
         return self._step.speed, self._step.angle
 
     @property

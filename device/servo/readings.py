@@ -210,7 +210,7 @@ class Heat(Part):
         return found
 
     def shapes(self, resistance_ohm: float) -> bool:
-        """Return whether the present resistance differs so much that the motor must follow it."""
+        """Return whether the motor must use the present resistance instead of the given one."""
         present = self.resistance_ohm
         return abs(present - resistance_ohm) > _RESISTANCE_STEP * present
 
@@ -265,7 +265,7 @@ class Heat(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ServoSettings(Copyable):
-    """Attributes that call `changed` when they are set to another value.
+    """Settings of a servo, which call `changed` when they are set to another value.
 
     Attributes:
         supply_mv: supply of the power stage in millivolts, which `supply_v` sets.
@@ -378,7 +378,7 @@ class ServoSettings(Copyable):
 
 
 class Readings(ServoSettings):
-    """Readings of a servo; `Servo` describes its attributes.
+    """Readings of a servo; the docstring of `Servo` describes the attributes.
 
     Integers are measurements of the drive; floats are values for observers.
     """

@@ -306,8 +306,8 @@ class Servo(Readings):
         """Compute control steps without applying them, with exactly the results of single steps.
 
         The run ends before the first step in which friction stops or holds the shaft, the demand is
-        cut, the resistance is followed, or the bounds are left. Single steps continue from the end
-        of the run.
+        cut, the motor gets another resistance, or the bounds are left. Single steps continue from
+        the end of the run.
 
         Args:
             line: demands without acceleration, beginning with the present demand.

@@ -9,7 +9,7 @@ K = TypeVar("K")
 
 
 class Listeners(list[T]):
-    """Callbacks of outside code. A twin starts without callbacks."""
+    """Callbacks of outside code. A twin (a copy of a device) starts without callbacks."""
 
     __slots__ = ()
 

@@ -128,7 +128,7 @@ class Sensor(Protocol):
         """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Return the answer with the latest scan, or empty if it follows later, or None."""
+        """Return the answer with the latest scan, b"" if it follows later, None if refused."""
         ...
 
 
@@ -156,7 +156,7 @@ class Capture(Immutable):
         return encode_reply(self.line, SCIP1_OK, lines)
 
     def refuse(self, code: str) -> bytes:
-        """Return the answer that no scan will follow."""
+        """Return the answer to a command that gets no scan."""
         return encode_reply(self.line, ERROR)
 
 

@@ -113,7 +113,7 @@ class _Rotation:
 
     @property
     def present_rpm(self) -> int:
-        """Number of turns per minute at the present level."""
+        """Speed in turns per minute, reduced by the present level."""
         return self.speed_rpm * (100 - self.level) // 100
 
     @property
@@ -147,7 +147,7 @@ _WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
 
 @dataclass(slots=True)
 class Stream:
-    """A command that measures.
+    """A command that requests scans.
 
     Attributes:
         command: command as received, which is valid.
@@ -330,7 +330,7 @@ class ScipServer(Part):
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Return the answer with the latest scan, or empty if it follows later, or None."""
+        """Return the answer with the latest scan, b"" if it follows later, None if refused."""
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:

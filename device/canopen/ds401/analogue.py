@@ -152,12 +152,12 @@ class _AnalogueChannel(Part):
 
     @property
     def whole(self) -> bool:
-        """Whether the physical side is counted in whole numbers."""
+        """Whether the physical quantity is a whole number."""
         return self.converter is None and bool(self.integers)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Smallest and largest quantity of the physical side."""
+        """Smallest and largest physical quantity."""
         if self.converter is not None:
             return self.converter.low, self.converter.high
         return self.integers[-1].data_type.limits if self.integers else (-_REAL32_MAX, _REAL32_MAX)
@@ -218,7 +218,7 @@ class _EventRule(Part):
         self._sent = self._seen = _quantity(self._entry)
 
     def sent(self) -> None:
-        """Record that the value is on the bus."""
+        """Record that the present value was sent."""
         self._sent = _quantity(self._entry)
 
     def judge(self, trigger: int) -> bool:
@@ -243,10 +243,10 @@ _BANK_CHANNELS: Final = 32
 
 
 class InterruptSource(Part):
-    """Banks of 32 channels; reading a bank over the bus clears it.
+    """Interrupt sources: a bit for each channel in banks of 32; reading over the bus clears a bank.
 
     Attributes:
-        entries: the banks.
+        entries: the objects of the banks.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -337,7 +337,7 @@ class AnalogueInput(Part):
             rule.begin()
 
     def sent(self) -> None:
-        """Record that the present value is on the bus."""
+        """Record that the present value was sent."""
         for rule in self._rules:
             rule.sent()
 

@@ -142,7 +142,7 @@ class DigitalInputs(Part):
 
     @property
     def due_us(self) -> int:
-        """The time at which the filter next accepts a line."""
+        """The time at which the filter next accepts the level of a line."""
         return min(self._waits.values(), default=NEVER)
 
     def settings(self) -> list[Entry]:

@@ -16,7 +16,7 @@ from tickrig.wire.canopen.datatypes import DataType
 
 
 class DigitalObjects(NamedTuple):
-    """The indices of a property of lines, by the number of lines in an element.
+    """The indices of objects with one property of digital lines, by the number of lines per entry.
 
     Objects for single lines have eight consecutive indices, each for up to 128 lines.
     """
@@ -108,7 +108,7 @@ DEFAULTS: Final[dict[int, int]] = {
 
 
 def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
-    """Yield the numbers in an object, each with its sub-index; there may be gaps."""
+    """Yield the entries of an object that are numbers, each after its sub-index."""
     for entry in dictionary.object(index):
         if 1 <= entry.sub <= 254 and _is_number(entry):
             yield entry.sub, entry

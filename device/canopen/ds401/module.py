@@ -231,7 +231,7 @@ class Ds401(Application):
 
     Args:
         node: the slave.
-        slot: place of the application in the order of a tick.
+        slot: position of the application in the order in which services act in a tick.
         inputs: converters of the analogue inputs, starting with the first input. Inputs without a
             converter use plain counts.
         outputs: converters of the analogue outputs, in the same way.

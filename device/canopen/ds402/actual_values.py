@@ -94,18 +94,18 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Write all values before a change; the values stay valid until the end of the tick."""
+        """Store the present values in the entries, which are read until the end of the tick."""
         if not self._kept:
             for entry in self._entries:
                 entry.assign(self._encoded(entry))
             self._kept = True
 
     def begin(self) -> None:
-        """Show the written values while the drive works."""
+        """Let the bus read the stored values while the drive works."""
         self._kept = True
 
     def renew(self) -> None:
-        """Show the new values of the drive, and call the watchers."""
+        """Let the bus read the new values of the drive, and call the watchers."""
         self._kept = self.watched = False
         for entry in self._entries:
             if entry.watchers:

@@ -83,7 +83,9 @@ def command_of(controlword: int) -> Command | None:
 
 
 class Automaton(Part):
-    """Brakes before transitions 5 and 8 if their option codes require it.
+    """The state machine of a drive (CiA 402).
+
+    It brakes before transitions 5 and 8 if their option codes require that.
 
     Args:
         stopping: object that brakes according to the option codes.
@@ -114,7 +116,7 @@ class Automaton(Part):
         self.state, self._leaving = DriveState.NOT_READY_TO_SWITCH_ON, None
 
     def obey(self, command: Command) -> None:
-        """Make the transition of a controlword, if there is one."""
+        """Make the transition that a command causes in the present state, if there is one."""
         if self.state is DriveState.OPERATION_ENABLED:
             self._leaving = None
         following = NEXT_STATE.get((self.state, command))

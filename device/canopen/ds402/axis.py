@@ -224,7 +224,7 @@ class Axis(Part):
 
     @property
     def unwrapped(self) -> tuple[float, float]:
-        """Lowest and highest counts, within a unit, at which `wrap` does nothing."""
+        """Lowest and highest counts, a unit inside the range, at which `wrap` does nothing."""
         low, high = self.settings.position_range
         unit = self.settings.units.per_position
         first, last = self.zero + (low + 1) * unit, self.zero + (high - 1) * unit
@@ -314,7 +314,7 @@ _STAYING: Final = 4
 
 
 class Stopping(Part):
-    """Slows the reference of an axis down.
+    """Slows down the reference of an axis, according to an option code.
 
     Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
 

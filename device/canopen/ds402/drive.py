@@ -143,7 +143,7 @@ class Ds402(Application):
 
     Args:
         node: the slave.
-        slot: place of the application in the order of a tick.
+        slot: position of the application in the order in which services act in a tick.
         servo: motor, power stage and load, or None for an ideal motor.
         defaults: values of objects that the dictionary does not have, by (index, sub-index).
 
@@ -238,7 +238,7 @@ class Ds402(Application):
 
     @property
     def goes_on_plainly(self) -> bool:
-        """Whether the next ticks only run the mode, and no callback needs every tick."""
+        """Whether the next ticks only run the mode, and nothing else needs each of them."""
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free
         return self.automaton.operating and not (changes or waits)

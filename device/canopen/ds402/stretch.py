@@ -17,7 +17,7 @@ _FEWEST: Final = 2
 
 
 class Stretch(Part):
-    """The coming ticks of a drive in which it only continues a plain motion.
+    """Coming ticks, computed at once, in which a drive only continues a plain motion.
 
     Between two SYNCs a drive in csp does the same work each millisecond. If its rig allows it,
     the drive computes as many such ticks at once as the latest quiet period lasted. When a value

@@ -53,7 +53,7 @@ def total_bits(slots: tuple[Slot, ...]) -> int:
 
 
 def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
-    """Return the entry whose bytes are all the bytes of a TPDO, or None."""
+    """Return the entry whose bytes alone are the data of a TPDO, or None."""
     entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
     return None if entry is None or entry.source is not None else entry
 

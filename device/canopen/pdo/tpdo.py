@@ -180,7 +180,7 @@ class Tpdo(Part):
 class PdoProducer(Service):
     """Sends PDOs in Operational.
 
-    PDOs are packed at the place of TPDOs in the tick, after the application. A TPDO of a SYNC
+    In a tick, PDOs are packed after the application has acted. A TPDO of a SYNC
     contains the values after the RPDOs of this SYNC and after the application. It is sent in the
     same tick, so it is never sent after the synchronous window (1007h). Each event-driven TPDO is
     sent once when the node enters Operational or when the TPDO is switched on, as in CANopenNode.

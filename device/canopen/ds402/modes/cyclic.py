@@ -172,7 +172,7 @@ class InterpolatedPosition(CyclicPosition):
         return settled
 
     def ahead(self) -> Line | None:
-        """Return None, because the bits of the mode in the statusword change on the way."""
+        """Return None: the statusword changes on the way, so each step needs a call of `step`."""
         return None
 
     def halt(self, now_us: int) -> bool:

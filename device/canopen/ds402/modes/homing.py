@@ -25,7 +25,7 @@ class HomingMethod(NamedTuple):
     """A homing method: where home is and how to find it.
 
     Attributes:
-        switch: switch whose edge counts, or None if the method uses no switch.
+        switch: switch whose edge is searched, or None if the method uses no switch.
         first: direction of the search when the switch is not active.
         approach: direction in which the axis crosses the edge, then the index pulse, at the end.
         active: whether the switch is active after the edge, in the direction of `approach`.
@@ -96,7 +96,7 @@ class Phase(Enum):
 class HomingSearch(Part):
     """Searches for home with a method.
 
-    The axis always crosses the edge that counts slowly. If it hits the switch during the search,
+    The axis always crosses the edge slowly at the end. If it hits the switch during the search,
     or cannot brake within a narrow switch, it moves back first. Therefore home is the same
     position from every start. An edge counts only while the axis moves as demanded.
 
@@ -200,7 +200,7 @@ class Homing(Mode):
     The axis brakes beyond the edge or index pulse that is home, and then returns to it: at the
     end 6064h equals 607Ch. An index pulse occurs each time the encoder has turned by its counts.
     The position of an index pulse is exact to the count; the position of an edge is exact to the
-    way that the axis moves in a tick. Halt and the falling edge of bit 4 end a homing in
+    distance that the axis moves in a tick. Halt and the falling edge of bit 4 end a homing in
     progress; a rising edge starts a new one. The result of a homing is valid until the next
     homing begins.
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class ModeBit(IntEnum):
     """Bits of the statusword that a mode sets.
 
-    Operators of an `IntEnum` are those of `int`; of a flag they take 20 times as long.
+    An `IntEnum` uses the operators of `int`. Those of a flag take 20 times as long.
     """
 
     TARGET_REACHED = Statusword.TARGET_REACHED
