@@ -64,7 +64,7 @@ def encode_frame(address: int, message: bytes) -> bytes:
 
 
 def parse_frame(frame: bytes) -> tuple[int, bytes]:
-    """Read a frame; return the address and the message.
+    """Check the CRC of a frame, and return the address and the message.
 
     Raises:
         FramingError: the length is invalid.
@@ -126,7 +126,7 @@ class Request:
 
 
 def encode_request(request: Request) -> bytes:
-    """Write a request in the format of its function code."""
+    """Return the bytes of a request, in the format of its function code."""
     out = bytes([request.function])
     if request.read is not None:
         out += _PAIR.pack(*request.read)
@@ -161,7 +161,7 @@ def parse_request(message: bytes) -> Request:
 
 
 def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
-    """Write the response to a successful request; `values` are the read values."""
+    """Return the bytes of the response to a successful request; `values` are the read values."""
     out = bytes([request.function])
     if request.read is not None:
         return out + bytes([2 * len(values)]) + _pack_registers(values)

@@ -238,14 +238,14 @@ WIDTHS: Final = {"D": 3, "S": 2}
 
 
 def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
-    """Return the lines after the status; raise FieldError for a number that does not fit."""
+    """Return the lines of a scan after the status; FieldError for a number that does not fit."""
     data = encode_numbers(distances, width)
     blocks = [data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES)]
     return tuple(with_sum(line) for line in (encode_number(time_ms, _TIME_WIDTH), *blocks))
 
 
 def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]]:
-    """Return time stamp in ms and distances in mm.
+    """Return the time stamp in ms and the distances in mm of a scan.
 
     Raises:
         ChecksumError: the sum of a line is wrong.
@@ -357,7 +357,7 @@ class ReplySplitter:
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
-    """Return the lines of values; the sum does not include the semicolon."""
+    """Return a line for each key and value; the sum does not include the semicolon."""
     texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
     return tuple(with_sum(text + b";", text) for text in texts)
 

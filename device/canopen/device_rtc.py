@@ -423,8 +423,8 @@ def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
 class DeviceRtc(Application):
     """Runs a component whose state follows the NMT state of its node.
 
-    (NEDO report, 3.4.43.3, Fig. 110.) Callbacks take no time. The periodic callback runs for the first time one period after the
-    component has entered the state.
+    The source is the NEDO report, 3.4.43.3, Fig. 110. Callbacks take no time. The periodic callback
+    runs for the first time one period after the component has entered the state.
 
     Not emulated: service ports, configuration sets, several components on one node.
 

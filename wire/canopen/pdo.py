@@ -178,8 +178,8 @@ class Mpdo:
     """A multiplexed PDO (CiA 301, MPDO protocol).
 
     Attributes:
-        destination: whether the MPDO is in destination address mode. The other fields then name the
-            consumer, or else they name the producer.
+        destination: whether the MPDO is in destination address mode. If it is, the other fields
+            name the consumer, otherwise they name the producer.
         node_id: node-ID of the consumer or the producer. In destination address mode 0 means all
             nodes.
         index: index of the object in that node.

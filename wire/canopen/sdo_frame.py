@@ -206,7 +206,7 @@ def check_frame(frame: bytes) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BlockSegment:
-    """A segment of a block with 7 bytes; the end frame has the fill of the last segment.
+    """A segment of 7 bytes in a block; `BlockEnd` has the number of unused bytes in the last one.
 
     Attributes:
         seqno: position in the block, 1..127.

@@ -37,14 +37,14 @@ class Parameter:
         self.values = {d: value for d, value in numbers.items() if low <= value <= high}
 
     def read(self, digits: bytes) -> int:
-        """Read the parameter from its digits; raise FieldError for a bad digit or value."""
+        """Return the value of hex digits; raise FieldError for a bad digit or value."""
         value = self.values.get(digits)
         if value is None:
             return self.checked(read_signed(digits) if self.low < 0 else read_hex(digits))
         return value
 
     def write(self, value: int) -> bytes:
-        """Write the parameter in lower case, as in the samples of the manual."""
+        """Return the hex digits of a value in lower case, as in the samples of the manual."""
         return b"%0*x" % (self.width, value & 0xFF)
 
     def checked(self, value: int) -> int:
@@ -111,7 +111,7 @@ class Command:
         return tuple([getattr(self, name) for name in names])
 
     def encode(self, *, check: bool = False) -> bytes:
-        """Write the line with its LF, and with CHECK if stablemode requires it."""
+        """Return the bytes of the line with its LF, and with CHECK if stablemode requires it."""
         digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
         message = self.name + self.literal + b"".join(digits)
         return message + (check_digit(message) if check else b"") + b"\n"
@@ -316,7 +316,7 @@ _NAME: Final = re.compile(b"|".join(COMMANDS))  # no name is a prefix of another
 
 
 def parse_command(message: bytes) -> Command:
-    """Read a command without line end and CHECK.
+    """Return the command in a line without line end and CHECK.
 
     Raises:
         UnknownCommand: the name is unknown. Names are lower case.

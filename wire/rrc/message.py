@@ -14,7 +14,7 @@ _HEX_DIGITS: Final = {bytes([code]): int(chr(code), 16) for code in b"0123456789
 
 
 def all_digits(width: int) -> list[bytes]:
-    """Return all numbers with a given number of hex digits, in every mixture of cases."""
+    """Return all texts of a given number of hex digits, in upper, lower and mixed case."""
     return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
 
 

@@ -126,7 +126,7 @@ class StatusA:
         speed_mode: int,
         counts: tuple[int, int, int],
     ) -> bytes:
-        r"""Write the line of these values with its CHECK and LF.
+        r"""Return the line with these values, with its CHECK and LF.
 
         Args:
             stick_pct: #1 and #2.

@@ -66,17 +66,17 @@ _STATES: Final = {
 
 
 def encode_request(frame: LiteFrame) -> bytes:
-    """Write a request as a packet; raise KeyError if RTno has no letter for the request."""
+    """Return a request as a packet; raise KeyError if RTno has no letter for the request."""
     return pack(LETTERS[frame.command], frame.data)
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Write a frame of the device as a packet; raise KeyError if RTno has no letter for it."""
+    """Return a frame of the device as a packet; raise KeyError if RTno has no letter for it."""
     return pack(LETTERS[frame.command], _packet_data(frame))
 
 
 def pack(letter: bytes, data: bytes) -> bytes:
-    """Write a packet in either direction."""
+    """Return the bytes of a packet in either direction."""
     body = letter + bytes([len(data)]) + data
     return HEADER + body + bytes([sum(body) & 0xFF])
 

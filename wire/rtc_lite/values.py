@@ -24,7 +24,7 @@ _MAX_NAME_BYTES: Final = 15
 
 
 def encode_name(name: str) -> bytes:
-    """Write a name of 1 to 15 printable ASCII characters without blanks (DECISION L6).
+    """Return the bytes of a name: 1 to 15 printable ASCII characters, no blanks (DECISION L6).
 
     Raises:
         FieldError: the name is empty, is too long, or has other characters.
@@ -66,7 +66,7 @@ class LitePortType(Generic[T]):
         return self.code.isupper()
 
     def encode(self, value: T) -> bytes:
-        """Write a value; raise FieldError if the value does not have this type."""
+        """Return the bytes of a value; raise FieldError if the value does not have this type."""
         if self.format == _TEXT:
             return self._encode_text(cast(str, value))
         values: Any = value if self.sequence else (value,)
@@ -76,7 +76,7 @@ class LitePortType(Generic[T]):
             raise FieldError(f"{self.name} cannot be {values}: {error}") from None
 
     def decode(self, data: bytes) -> T:
-        """Read a value; raise FieldError if the bytes do not have this type."""
+        """Return the value of bytes; raise FieldError if the bytes do not have this type."""
         self.check_size(data)
         if self.format == _TEXT:
             return cast(T, data.decode("latin-1"))

@@ -338,7 +338,7 @@ class EdsDevice:
 
 
 def read_device(file: EdsFile) -> EdsDevice:
-    """Read a file; invalid parts are skipped and added to the errors of the file.
+    """Return the device of a file; invalid parts are skipped and added to the errors of the file.
 
     A deviation from the standard with a clear meaning becomes a warning that names the value used:
     C suffixes, empty and missing keywords, CompactSubObj in a RECORD, texts beyond ASCII. A

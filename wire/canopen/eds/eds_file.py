@@ -47,7 +47,7 @@ _DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
 class Finding(NamedTuple):
-    """A fault of a file.
+    """An error or warning in an EDS file.
 
     Attributes:
         file: name of the file.
@@ -183,7 +183,7 @@ class EdsFile:
         return key.lower() in self.sections.get(section, {})
 
     def word(self, section: str, key: str) -> str:
-        """Return the value of a keyword without free text, without a trailing comment.
+        """Return the value of a keyword that is not a free text, without a trailing comment.
 
         In CiA 306 comments are separate lines. Readers also accept ` ;` after any value. After a
         number or an access type, `;`, `#` and `//` start a comment, too, with a warning. Unlike in

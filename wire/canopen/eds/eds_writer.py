@@ -34,7 +34,7 @@ _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
 
 class Table(Protocol):
-    """A table of `EntryDescription`: an `ObjectTable`, or the description of dictionaries."""
+    """A table of `EntryDescription`: an `ObjectTable`, or the description of a dictionary."""
 
     @property
     def objects(self) -> Mapping[int, object_table.ObjectDescription]:
@@ -79,7 +79,7 @@ def write_dcf(
     values: Mapping[int, bytes],
     info: object_table.DeviceInfo = _NO_INFO,
 ) -> str:
-    """Write the objects with default and present values, for one node.
+    """Return the text of a DCF with the default and present values of one node.
 
     Args:
         table: the objects.
