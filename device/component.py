@@ -68,13 +68,13 @@ class DeviceComponent(Copyable):
         """Finalize; called once."""
 
     def on_activated(self) -> Result:
-        """Activate: Inactive becomes Active; an error leads to Error."""
+        """Activate: Inactive becomes Active; an error leads to the state Error."""
 
     def on_deactivated(self) -> Result:
-        """Deactivate: leave Active; an error leads to Error."""
+        """Deactivate: leave Active; an error leads to the state Error."""
 
     def on_execute(self) -> Result:
-        """Execute, once a period while Active; an error leads to Error."""
+        """Execute, once a period while Active; an error leads to the state Error."""
 
     def on_aborting(self) -> Result:
         """Abort, on the way from Active to Error; the return value is ignored."""

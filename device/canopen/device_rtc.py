@@ -338,7 +338,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         return True
 
     def moved(self, old: NmtState, new: NmtState) -> None:
-        """Run the callbacks after a change of state; an error leads to Error."""
+        """Run the callbacks after a change of state; an error leads to the state Error."""
         well = self._call_all(_ENTERED.get((old, new), ()))
         if well or new is NmtState.STOPPED:
             return
@@ -347,7 +347,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         self._node.enter(NmtState.STOPPED)
 
     def run(self) -> None:
-        """Run the periodic callback of the state; an error leads to Error (M5, M6)."""
+        """Run the periodic callback of the state; an error leads to the state Error (M5, M6)."""
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)
 

@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 class LitePort(Generic[T]):
-    """Base of both kinds of ports.
+    """Base of in-ports and out-ports.
 
     Args:
         name: name of 1 to 15 printable ASCII characters.

@@ -413,7 +413,7 @@ class Readings(ServoSettings):
 
     @property
     def gear_counts(self) -> int:
-        """Angle by the absolute encoder of the output shaft with all turns, or 0 without it."""
+        """Angle from the absolute encoder of the output shaft, with all turns; 0 if it has none."""
         return floor(self.shaft_deg / 360.0 * self.parameters.encoders.gear_counts_per_turn)
 
     @property

@@ -79,7 +79,7 @@ def rays_of(angles_rad: Sequence[float]) -> _Rays:
 
 @dataclass(frozen=True, slots=True)
 class Wall(Immutable):
-    """A straight wall between two places, in m."""
+    """A straight wall between two points, in m."""
 
     x1_m: float
     y1_m: float

@@ -31,7 +31,7 @@ class RampShape(IntEnum):
 
 
 class Motion(NamedTuple):
-    """Position, velocity and acceleration; unit/s and unit/s^2 for any unit of length."""
+    """Position, velocity and acceleration, in any unit of length, unit/s and unit/s^2."""
 
     position: float
     velocity: float = 0.0

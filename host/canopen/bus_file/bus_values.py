@@ -115,7 +115,7 @@ class BusSlave:
     Attributes:
         name: name of the slave, which is the name of its section.
         node_id: node-ID of the slave, 1..127.
-        place: place of the slave's section in the file.
+        place: file and line of the slave's section.
         sheet: EDS or DCF of the slave.
         device: the device that the EDS or DCF describes.
         identity: identity that the master checks at boot-up.
@@ -193,7 +193,7 @@ class BusMaster:
 
     Attributes:
         node_id: node-ID of the master, 1..127, or 255 if the file does not set a node-ID.
-        place: place of the master's section in the file.
+        place: file and line of the master's section.
         baudrate: bit rate of the bus in kbit/s.
         identity: identity of the master.
         sync_period_us: period of SYNC, or 0 for no SYNC.

@@ -23,7 +23,7 @@ class Layout(NamedTuple):
         options: section of options, or None if the file has none.
         master: section of the master, or None if the file has none.
         slaves: sections of the slaves by name, in the order of dcfgen.
-        hidden: places of keys that begin with a dot, by name. The mapping is empty unless dcfgen
+        hidden: file and line of each key that begins with a dot, by name. It is empty unless dcfgen
             reads the file directly.
         defaults: section that cogen merges into all nodes, or None if the file has none.
     """

@@ -71,7 +71,7 @@ class BusFileSection:
         notes: collector of the findings.
         name: section and keys, as shown to the user.
         item: mapping to read. Any other value is reported and counts as an empty mapping.
-        place: place of the mapping's key.
+        place: file and line of the mapping's key.
     """
 
     def __init__(self, notes: BusFileNotes, name: str, item: Item, place: FilePlace) -> None:
@@ -91,7 +91,7 @@ class BusFileSection:
         return key in self.fields
 
     def place_of(self, key: Key) -> FilePlace:
-        """Return the place of a key, or the place of the section if the key is missing."""
+        """Return the file and line of a key, or those of the section if the key is missing."""
         return self._item.keys.get(key, self.place)
 
     def note(self, rule: str, key: Key, text: str) -> None:

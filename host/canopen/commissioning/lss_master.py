@@ -68,7 +68,7 @@ class LssMaster:
     Args:
         bus: bus with the slaves.
         answer_us: time to wait for the answer to a command.
-        scan_us: time to wait for answers to each of the 133 questions of a fastscan.
+        scan_us: time to wait for answers to each of the 133 requests of a fastscan.
 
     Attributes:
         waiting: whether all slaves have returned to the state waiting at the end of `at_work`.

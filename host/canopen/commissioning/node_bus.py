@@ -65,7 +65,7 @@ class NodeBus:
         return now_us, frames
 
     def gather(self, span_us: int) -> list[CanFrame]:
-        """Let this much time pass. Return the frames that arrive."""
+        """Wait for this time. Return the frames that arrive."""
         until_us, found = self.now_us + span_us, list[CanFrame]()
         now_us = self.now_us
         while now_us < until_us:
@@ -161,7 +161,7 @@ class NodeFound:
             node does not have.
         name: device name (object 1008h), empty if the node has none.
         state: last reported NMT state, or None if the node reported none.
-        answers: number of answers to one question. 2 means that two nodes share this node-ID.
+        answers: number of answers to one request. 2 means that two nodes share this node-ID.
         heartbeat_ms: producer heartbeat time (object 1017h), or None if the node has none.
     """
 

@@ -119,7 +119,7 @@ def _starts(step: Step) -> bool:
 
 
 class Judge:
-    """Judge that plays checks on a node in the state in which every check begins.
+    """Judge that runs checks on a node. Every check begins in the same state of the node.
 
     Args:
         plan: options of the run.

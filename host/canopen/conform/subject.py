@@ -438,7 +438,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     claims: EdsClaims | None,
     others: Collection[int],
 ) -> Subject:
-    """Find out the properties of a node. The node is only read.
+    """Find out the properties of a node. Nothing is written to the node.
 
     Raises:
         SdoTimeout: the node does not answer.

@@ -92,7 +92,7 @@ class NmtMaster:
         halted: whether a mandatory slave could not be booted. The master then starts no more
             slaves.
         strangers: node-IDs that booted but do not belong to a slave (error status A).
-        process_data: receiver of all other data frames, which also works in periods.
+        process_data: receiver of all other data frames, which also starts the periods of drives.
         now_us: time of the last `tick`.
     """
 

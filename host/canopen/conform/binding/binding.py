@@ -171,7 +171,7 @@ def bind(
     allow: Collection[int] = (),
     never: Collection[int] = (),
 ) -> Binding:
-    """Find an object or PDO for each name. The node is only read.
+    """Find an object or PDO for each name. Nothing is written to the node.
 
     Objects that checks write later are in the communication area or the manufacturer area. Without
     an EDS these objects are only in the communication area, because it is unknown which other

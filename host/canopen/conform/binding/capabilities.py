@@ -158,7 +158,7 @@ class NodeFeatures:
 def find_features(
     binding: Binding, client: SdoClient, claims: EdsClaims | None = None
 ) -> NodeFeatures:
-    """Find out the capabilities of a node. The node is only read.
+    """Find out the capabilities of a node. Nothing is written to the node.
 
     Only the EDS shows whether the node has LSS, because a trial would change the state of all nodes
     on the bus. Without an EDS the tester assumes that the node has no LSS.
