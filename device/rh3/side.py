@@ -155,7 +155,7 @@ class _SpeedLoop(Part):
 
     @property
     def settled(self) -> bool:
-        """Whether a step towards standstill, in which the encoder counts nothing, changes nothing."""
+        """Whether a step towards standstill, where the encoder counts nothing, changes nothing."""
         return not (self.reference or self._error or self._change or self.counted)
 
     def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
