@@ -41,7 +41,7 @@ class _Verbs(LazyGroup):
     """The command group with the verbs of canmon."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a verb. The verb ends when its output is no longer read."""
+        """Run a verb. The verb ends when no program reads its output any more."""
         with until_unread():
             return super().invoke(ctx)
 

@@ -80,7 +80,7 @@ _IDENTITY: Final = 0x1018
 
 
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
-    """Read the identity of a node (1018h), or None if the node does not send vendor or product."""
+    """Return the identity of a node (1018h), or None if it does not send vendor or product."""
     return eds_folder.node_identity([_number(bus, node_id, sub) for sub in (1, 2, 3)])
 
 
@@ -173,7 +173,7 @@ def read_eds_paths(
     folders: Sequence[Path] = (),
     notify: Callable[[str], None] = say,
 ) -> eds_folder.EdsFiles:
-    """Read files by node-ID. Raise Refused if a file cannot be read, or is not an EDS.
+    """Read EDS files by node-ID. Raise Refused if a file cannot be read, or is not an EDS.
 
     The function reports mistakes in a file on standard error, and does not use the entries with
     mistakes.

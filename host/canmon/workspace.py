@@ -114,7 +114,7 @@ class Workspace:
         return found
 
     def wrong(self, error: SettingError, section: str = "") -> WorkspaceError:
-        """Return the error of a setting with the line of the setting."""
+        """Return an error that also names the line of the invalid setting."""
         path = (section, *error.path) if section else error.path
         place = read_toml(self._text).line_of(path)
         name = f"{section}.{error}" if section else str(error)
@@ -264,7 +264,7 @@ class MonitorSetup:
         )
 
     def under(self, other: MonitorSetup) -> MonitorSetup:
-        """Return the setup, with precedence for the values of another setup."""
+        """Return this setup combined with another setup, whose values take precedence."""
         options = self.options if not other.source else BusOptions(bitrate=self.options.bitrate)
         given = {name: value for name in _OPTIONS if (value := getattr(other.options, name))}
         return MonitorSetup(

@@ -55,7 +55,7 @@ _HTML: Final = "--html"
 
 
 def check_files(files: Mapping[str, Path]) -> None:
-    """Check that the files can be written. Raise Refused if a file cannot be written.
+    """Raise Refused if one of the files cannot be written.
 
     Args:
         files: path of each file by option.
@@ -133,10 +133,10 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 
 
 def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
-    """Return a function that formats the lines of a check. Each call starts with the EDS only.
+    """Return a function that formats the frames of a check and their meaning as lines.
 
-    The evidence does not contain the frames between two checks. Therefore transfers and mappings of
-    one check are not valid in the next.
+    Each call knows only the EDS at its beginning. Transfers and mappings of earlier checks do not
+    count, because the frames between two checks are not recorded.
 
     Args:
         eds: EDS, or the result of reading an EDS, by node-ID.

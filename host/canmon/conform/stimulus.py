@@ -44,9 +44,10 @@ _INPUTS: Final = {"6000": "di", "6401": "ai"}
 
 
 class LinearConverter(NamedTuple):
-    """A linear converter.
+    """A linear conversion of an input to its object.
 
-    From `low` to `high`, the object goes from `first` to `last` in steps of `step`.
+    While the input goes from `low` to `high`, the object goes from `first` to `last` in steps of
+    `step`.
     """
 
     low: float
@@ -57,7 +58,7 @@ class LinearConverter(NamedTuple):
 
 
 class SignalStimulus(ABC):
-    """Stimulus that executes the words of a check. It sets, reads and switches signals by name."""
+    """Base class of stimuli that set, read and switch signals by name, as a check requests."""
 
     def __call__(self, *words: str) -> str:
         """Execute a stimulus, and return the read value.
@@ -212,7 +213,7 @@ _PATIENCE_S: Final = 30
 
 
 def open_stimulus(text: str) -> Stimulus:
-    """Return the stimuli for the inputs.
+    """Return the stimulus that sets the inputs of the device.
 
     Args:
         text: words of the option: `ask`, `control:PATH`, or the path of a control socket. Any other
@@ -434,7 +435,7 @@ class Consent:
         return sys.stdin.isatty() and sys.stderr.isatty()
 
     def begin(self, node_id: int, level: Level, others: dict[int, int]) -> None:
-        """Show other nodes on the bus. Ask before the first frame that changes anything.
+        """Report other nodes on the bus, and ask for consent before anything is changed.
 
         Raises:
             Refused: the answer is no, or there is no terminal to ask.

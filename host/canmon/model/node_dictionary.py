@@ -167,7 +167,7 @@ _BESIDE_NAME: Final = 60
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
-    """Return a head, and a line for each object. An error is shown in place of the type.
+    """Return lines of text: a header, and a line for each object. An error replaces the type.
 
     Args:
         rows: objects to show.

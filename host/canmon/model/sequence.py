@@ -202,7 +202,7 @@ class DecodedCondition:
         self._latest: tuple[Record, Decoded] | None = None
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Take a frame. The next conditions apply to this frame."""
+        """Store a frame. The next conditions apply to this frame."""
         self._latest = record, decoded
 
     def condition(self, text: str) -> FrameCondition:
@@ -225,11 +225,11 @@ _FrameStep = Step[Frames, Record]
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """The steps of a sequence, and the function that locates them.
+    """A sequence: its steps, and a function that returns their location in the file.
 
     Attributes:
         steps: steps in order.
-        locate: function that returns `FILE:LINE` of a place.
+        locate: function that returns `FILE:LINE` of a step.
     """
 
     steps: tuple[_FrameStep, ...]

@@ -48,7 +48,7 @@ _MOST_SIGNALS: Final = 400
 
 
 class TimeBins(Generic[_Key]):
-    """Sums over spans of time of equal width. The width doubles when there are too many spans.
+    """Sums of amounts over spans of time of equal width, which doubles if there are too many.
 
     Args:
         most: maximum number of spans.
@@ -66,7 +66,7 @@ class TimeBins(Generic[_Key]):
         self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
-        """Make room for a time. Spans are merged if there are too many."""
+        """Make sure that a time lies in a span. If there are too many spans, merge them."""
         shift = (at_us // self.width_us // self._most).bit_length()
         if not shift:
             return
@@ -84,17 +84,17 @@ class TimeBins(Generic[_Key]):
             self.ranges[name] = joined
 
     def add(self, key: _Key, at_us: int, amount: int) -> None:
-        """Add to the span that contains a time."""
+        """Add an amount to the span that contains a time."""
         self.reach(at_us)
         self.add_at(key, at_us // self.width_us, amount)
 
     def add_at(self, key: _Key, place: int, amount: int) -> None:
-        """Add to a span. `reach` has made room for the span."""
+        """Add to a span by its index. Call `reach` first."""
         spans = self.sums.setdefault(key, {})
         spans[place] = spans.get(place, 0) + amount
 
     def spread_at(self, key: _Key, place: int, low: float, high: float) -> None:
-        """Extend the range of a span by these values. `reach` has made room for the span."""
+        """Extend the range of a span to include these values. Call `reach` first."""
         spans = self.ranges.setdefault(key, {})
         was = spans.get(place)
         spans[place] = (low, high) if was is None else (min(was[0], low), max(was[1], high))
@@ -147,7 +147,7 @@ class _Bands:
         self.count = 0
 
     def take(self, at_us: int, state: str) -> None:
-        """Take a state. A state that continues is not a change."""
+        """Add a state. The same state again is not a change."""
         if self.changes and self.changes[-1][1] == state:
             return
         self.count += 1
@@ -197,7 +197,7 @@ class SignalTrack:
 
 
 class Mark(NamedTuple):
-    """A moment on the lane of a node.
+    """An event of a node, for display on the lane of the node.
 
     Attributes:
         at_us: time since the first frame.
@@ -283,10 +283,7 @@ class Survey(NodeBoard):
             self.first_us = self.last_us = at_us
 
     def reach(self, since_us: int) -> int:
-        """Make room for a time in all bins, which have equal spans.
-
-        Return the index of its span.
-        """
+        """Make sure that all bins contain a time. Return the index of its span."""
         for bins in (self.counts, self.bits, self.errors, self.values):
             bins.reach(since_us)
         return since_us // self.bits.width_us
@@ -306,7 +303,7 @@ class Survey(NodeBoard):
         self.bits.add_at(channel, place, bits)
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Take a frame for the lanes of nodes. The frame may be counted elsewhere."""
+        """Add the events of a frame to the lanes of nodes, without counting the frame."""
         kind, node, channel = decoded.kind, decoded.node, record.channel
         since_us = self.since(record.at_us)
         row = None if node is None else self.row(channel, node)
@@ -335,7 +332,7 @@ class Survey(NodeBoard):
             self.lane(channel, node).states.take(since_us, nmt_state_name(state))
 
     def take_signals(self, record: Record, decoded: Decoded) -> None:
-        """Take the values of a PDO, or of a message of a DBC file."""
+        """Add the values of a PDO, or of a message of a DBC file."""
         if not decoded.signals or not (decoded.kind == "dbc" or "pdo" in decoded.kind):
             return
         since_us = self.since(record.at_us)
@@ -412,7 +409,7 @@ class Survey(NodeBoard):
 
 
 class Piece(Protocol):
-    """Some frames of a log in their order."""
+    """A range of successive frames of a log."""
 
     def __len__(self) -> int:
         """Return the number of frames."""

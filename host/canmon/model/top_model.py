@@ -201,7 +201,7 @@ class _LineRow(NamedTuple):
 
 
 class LineTraffic:
-    """Counter of messages. Its memory grows with the kinds of messages, not with their number."""
+    """Counter of messages on serial lines. Its memory grows with the kinds of messages only."""
 
     def __init__(self) -> None:
         self._rows: dict[tuple[str, bool, str], _LineRow] = {}
@@ -239,7 +239,7 @@ def _word_of(decoded: Decoded) -> str:
 
 
 def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]:
-    """Return the table, empty if there are no rows."""
+    """Return the table of serial lines as text lines, empty if there are no rows."""
     if not rows:
         return []
     names = [f"{row.channel} {ARROWS[row.sent]} {row.word}" for row in rows]
@@ -319,7 +319,7 @@ def render(
     width: int = UNBOUNDED,
     height: int = UNBOUNDED,
 ) -> list[str]:
-    """Return at most `height` lines of at most `width` characters.
+    """Return the table as at most `height` lines of at most `width` characters.
 
     Args:
         snapshot: traffic to show.
@@ -459,7 +459,7 @@ class TopModel:
         }
 
     def take(self, records: Iterable[AnyRecord]) -> None:
-        """Count frames, and lines of serial ports, whatever is displayed."""
+        """Count frames, and lines of serial ports, even while the display is paused."""
         for record in records:
             if isinstance(record, Record):
                 self.traffic.take(record)

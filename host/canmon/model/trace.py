@@ -46,7 +46,7 @@ class TraceRow(NamedTuple):
 
 
 class Ring:
-    """Rows with running numbers, of which the latest are kept.
+    """Numbered rows of a trace, of which the latest are kept.
 
     Args:
         capacity: number of rows that are kept.
@@ -169,7 +169,7 @@ class Latest(NamedTuple):
 
 
 class DisplayFilter:
-    """A filter that follows a trace.
+    """The rows of a trace that pass a filter, updated as the trace grows.
 
     Args:
         trace: source of the rows. Rows that it already holds are included.

@@ -190,7 +190,7 @@ class BitRow(NamedTuple):
     the bits continue to bit 511.
 
     Attributes:
-        latest: bits in which the latest payload differs from the previous payload.
+        latest: bits in which the latest payload differs from the one before.
         planes: change counts of the payload bits. Plane n holds bit n of each count.
         notched: bits whose changes are known, and therefore not shown.
     """
@@ -220,7 +220,7 @@ class BitRow(NamedTuple):
 
 
 class BitMemory:
-    """Change counts of all bits at once. Each big number holds one binary digit of all counts.
+    """Counter of the changes of each payload bit. One big number holds one digit of all counts.
 
     A payload that is shorter than the previous one is padded with zeros.
 

@@ -348,7 +348,7 @@ class TransmitRow:
         return self.due_us < NEVER
 
     def enable(self, now_us: int) -> None:
-        """Send the row in each period from now on. Counters continue where they were.
+        """Start to send the row in each period. Counters continue at their last value.
 
         Raises:
             ValueError: the row has no period.
@@ -410,7 +410,7 @@ class TransmitList:
             row.disable()
 
     def enable(self, number: int, now_us: int) -> None:
-        """Send a row in each period from now on. Raise ValueError if that is not allowed."""
+        """Start to send a row in each period. Raise ValueError if that is not allowed."""
         self._check_armed()
         self.rows[number].enable(now_us)
 
@@ -433,7 +433,7 @@ ON, OFF, BY_HAND = "[x]", "[ ]", " - "
 
 
 def render_transmit(rows: Sequence[TransmitRow]) -> list[str]:
-    """Return a head, and a line for each row."""
+    """Return lines of text: a header, and a line for each row."""
     return [_HEAD, *map(_line, rows)]
 
 

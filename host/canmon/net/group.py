@@ -32,7 +32,7 @@ _ANSWER_US: Final = 500_000
 
 @dataclass(frozen=True, slots=True)
 class NetCall:
-    """The options before the verb.
+    """The options of `canmon net` that precede the verb.
 
     Attributes:
         word: SOURCE word, or None if the options name a bus.

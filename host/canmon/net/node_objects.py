@@ -362,7 +362,7 @@ def differences(
 
 
 def line(objects: NamedObjects, one: _ValueDifference, where: str) -> str:
-    """Return both values of a difference, as text."""
+    """Return a difference as text, with the value here and the other value."""
     there = f"{shown(objects, one.entry, one.wanted)} {where}"
     here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"
     return f"{objects.title(one.entry)}: {here}, {there}"

@@ -336,7 +336,7 @@ def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
 
 
 def reset(session: NetSession, node_id: int, sub: int) -> None:
-    """Reset a node, or only its restored communication. Wait for its boot-up."""
+    """Reset a node, or only its communication if only that was restored. Wait for its boot-up."""
     communication = sub == _COMMUNICATION
     command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
     session.bus.command(command, node_id)

@@ -67,7 +67,7 @@ class _Work:
         self._done += 1
 
     def progress(self) -> str:
-        """Return the finished and the open steps, empty if no steps were planned."""
+        """Return a text with the finished and the open steps, empty if no steps were planned."""
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
         said = [f"{word}: {_listed(items)}" for word, items in parts if items]
@@ -181,7 +181,7 @@ def failure_text(error: SdoFailed, title: _Title = write_entry) -> str:
 
 @contextmanager
 def of_node(node_id: int, title: _Title = write_entry) -> Iterator[None]:
-    """Raise NodeFailed with node and object for errors in the block."""
+    """Turn a failed SDO transfer in the block into NodeFailed, which names node and object."""
     try:
         yield
     except SdoFailed as error:

@@ -153,7 +153,7 @@ def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Clock that continues the time of the latest frame by the clock of this machine.
+    """Clock that starts at the time of the latest frame, and runs with the clock of this machine.
 
     The clock of a driver's time stamps may differ from the clock of this machine. Therefore only
     differences of stamps count.
@@ -278,9 +278,9 @@ class _Interruptions(Interrupter):
             super().received(number, frame)
 
     def behind(self, act: Callable[Given, _Result]) -> Callable[Given, _Result]:
-        """Return a function that is not interrupted.
+        """Return the function, protected from interruptions.
 
-        An interruption takes effect after the function.
+        An interruption during a call takes effect after the call.
         """
 
         def whole(*arguments: Given.args, **named: Given.kwargs) -> _Result:
@@ -418,7 +418,7 @@ def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot |
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
-    """Return the time to listen if no time is given. Files and pipes have an end."""
+    """Return the default time to listen, or None for files and pipes, which have an end."""
     return None if not source.live or list(words) == ["-"] else _PATIENCE_US
 
 

@@ -43,14 +43,14 @@ DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 
 
 class FilteredDecoder:
-    """Decoder that passes on the wanted frames.
+    """Decoder that returns only frames that pass a filter.
 
     Args:
         decoder: decoder of frames, or None for no decoding.
         wanted: filter that frames must pass, or None for all frames. A filter needs a decoder.
 
     Attributes:
-        taken: number of frames.
+        taken: number of frames before the filter.
         passed: whether any frame passed.
     """
 
@@ -62,7 +62,7 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return the same cut, whose earlier frames the decoder learns from."""
+        """Return the same cut, so that the decoder also learns from the frames before it."""
         if self._decoder is None or cut.begin is None:
             return cut
         return replace(cut, earlier=self._decoder.take)
@@ -255,7 +255,7 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 
 
 class StdoutWriter:
-    """Lines on standard output. In JSON and in a log, events between frames are also lines.
+    """Writer to standard output. In JSON and in a log, events between frames are also lines.
 
     A log and CSV are written with unchanged characters, so that other programs can read them again
     exactly. This does not apply to a terminal.
@@ -273,7 +273,7 @@ class StdoutWriter:
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
-        """Print frames at once. The writer never ends the reading."""
+        """Print frames at once. Return False, because the writer never ends the reading."""
         lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and (said := _DROPS.get(self._output)):

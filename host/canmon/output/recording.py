@@ -111,7 +111,7 @@ class LogFile:
         return taken
 
     def trigger(self, why: str) -> None:
-        """Record the kept and the following frames, if the recording waits for a trigger."""
+        """Trigger a waiting recording: write the kept frames and the following frames."""
         self.recorder.trigger(why, self._now_us)
 
     def close(self) -> None:

@@ -109,7 +109,7 @@ class AnySource(Generic[_Taken_co]):
         return [text for name, tally in self.tallies() for text in tally.messages(name)]
 
     def losses(self) -> list[str]:
-        """Report lost and unreadable frames, without items that are not meant to be frames."""
+        """Report lost and unreadable frames, but not items of other types."""
         return [text for name, tally in self.tallies() for text in tally.losses(name)]
 
     def errors(self) -> list[str]:
@@ -309,7 +309,7 @@ class _CutLog:
     def note(self, at_us: int) -> None:
         """Record the time of the first frame of a file.
 
-        Times count from the first frame of all files.
+        Times count from the earliest of these frames.
         """
         if self._origin_us is not None and self._origin_us <= at_us:
             return
@@ -632,7 +632,7 @@ class PieceLog(_LoggedSource):
         return [(str(self._path), self._reader.tally)]
 
     def pieces(self) -> Iterator[Columns | Sequence[Record]]:
-        """Read the file. `lost` and `marks` belong to the place after each piece."""
+        """Yield the file in pieces. After each piece, `lost` and `marks` apply to its end."""
         ahead: Columns | Sequence[Item] | None = ()
         while not self._ended:
             if not self._items:

@@ -272,7 +272,7 @@ class Session:
         return self._thread is not None
 
     def over(self, model: Model) -> Session:
-        """Return another session on the same source, after this session is closed."""
+        """Return a new session with another model on the same source. Close this session first."""
         session = Session(self.source, model, self.buses, self._clock)
         session.words = self.words
         return session

@@ -93,7 +93,7 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count frames. Displayed times may begin at the first of all frames.
+        """Count frames. The first call sets the origin of displayed times.
 
         Args:
             frames: frames to count. There is at least one frame.
@@ -104,7 +104,7 @@ class _FindingPrinter:
         self.frames += frames
 
     def begin_again(self) -> None:
-        """Restart the check. Findings that were already shown occur first, and are not repeated."""
+        """Restart the check. Findings that were already shown occur again, but stay hidden."""
         self._shown = self.counts.total()
         self.counts.clear()
         self.findings.clear()

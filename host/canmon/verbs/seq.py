@@ -52,7 +52,7 @@ class ConditionDecoder:
         self._decoder, self._latest = make_decoder(eds), DecodedCondition()
 
     def take(self, record: Record) -> None:
-        """Decode a frame. The next conditions apply to this frame."""
+        """Decode and store a frame. The next conditions apply to this frame."""
         self._latest.take(record, self._decoder.take(record))
 
     def condition(self, text: str) -> FrameCondition:

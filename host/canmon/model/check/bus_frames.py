@@ -37,7 +37,7 @@ _SPIKE_FRAMES: Final = 3
 
 
 class FramePlace(NamedTuple):
-    """The place of a frame in a log.
+    """The position and time of a frame in a log.
 
     Attributes:
         number: position of the frame in the log, from 1.
@@ -122,7 +122,7 @@ class BusFrames:
         return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, bool(ident & EXTENDED))
 
     def place(self, row: int) -> FramePlace:
-        """Return the place of a frame in the log."""
+        """Return the position and time of a frame in the log."""
         return FramePlace(self.number[row], self.at_us[row])
 
     def rows_by_ident(self) -> dict[int, Sequence[int]]:
@@ -154,7 +154,7 @@ class BusFrames:
         return len(self) >= _MANY and find_spec("numpy") is not None
 
     def picked(self, column: array[int], rows: Sequence[int]) -> Sequence[int]:
-        """Return the values of some rows. If the rows are an array of numpy, so are the values."""
+        """Return some rows of a column. If the rows are a numpy array, so are the values."""
         if isinstance(rows, list | tuple | range):
             return [column[row] for row in rows]
         kinds = {"q": np.int64, "Q": np.uint64, "B": np.uint8}
@@ -162,7 +162,7 @@ class BusFrames:
         return found  # type: ignore[no-any-return]
 
     def latest(self, times: array[int], begin: int = 0) -> int:
-        """Return the latest time from a row on."""
+        """Return the latest of the times from the row `begin` on."""
         if self.is_large:
             return int(np.frombuffer(times, np.int64)[begin:].max())
         return max(times[begin:])
@@ -213,7 +213,7 @@ class FrameKeeper:
 
     Attributes:
         buses: frames of each bus, by name.
-        frames: number of frames taken.
+        frames: number of stored frames.
     """
 
     def __init__(self) -> None:
@@ -221,7 +221,7 @@ class FrameKeeper:
         self.frames = 0
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Take frames, as a block of columns or as records."""
+        """Store frames, given as a block of columns or as records."""
         if not isinstance(frames, list | tuple) and isinstance(frames, column_frames.Columns):
             self._extend(frames)
             return

@@ -98,7 +98,7 @@ class Checker:
         self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
 
     def take(self, record: Record, decoded: Decoded | None = None) -> list[TrafficFinding]:
-        """Return violations in a frame, and in the second of the load that the frame completed.
+        """Check a frame, and the load of the second that it completed. Return the violations.
 
         Args:
             record: frame to check.
@@ -114,7 +114,7 @@ class Checker:
         return found
 
     def advance(self, now_us: int) -> list[TrafficFinding]:
-        """Return overdue frames when no frame indicates the current time."""
+        """Return findings about frames that are overdue now, while no frame arrives."""
         late = [rule for rule in self._expressions if rule.due_us < now_us]
         return [one for rule in late for one in rule.advance(now_us)]
 
@@ -145,7 +145,7 @@ class Checker:
         judged_us: int | None = None,
         errors: Iterable[str] = (),
     ) -> list[TrafficFinding]:
-        """Return missing frames at the end of the traffic.
+        """Return findings about frames that are missing at the end of the traffic.
 
         Args:
             end_us: time when listening ended.
@@ -160,7 +160,7 @@ class Checker:
         return found + self.advance(judged_us) + self._written_ended(judged_us)
 
     def missing(self, now_us: int) -> list[TrafficFinding]:
-        """Return missing frames up to now. Listening continues."""
+        """Return findings about frames that are missing now. The check continues."""
         found = ended(self._rules, self._made, self._latest(), now_us, (), ())
         return found + self._written_ended(now_us)
 
@@ -185,7 +185,7 @@ class Checker:
         return [one for rule in self._expressions for one in rule.end(end_us)]
 
     def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
-        """Return the violations in a second of a bus."""
+        """Return the violation of the load limit in a second of a bus, if there is one."""
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
 
@@ -282,7 +282,7 @@ class _Waiting:
 
 
 class Surroundings:
-    """Collector that adds the frames before and after a finding to it.
+    """Collector that adds to each finding the frames before and after it.
 
     The collector holds each finding until the frames after it have arrived.
 
@@ -299,7 +299,7 @@ class Surroundings:
     def take(
         self, record: Record, decoded: Decoded, found: Sequence[TrafficFinding]
     ) -> list[TrafficFinding]:
-        """Take a frame and its findings. Return findings that wait no longer, in order."""
+        """Add a frame and its findings. Return the findings that are now complete, in order."""
         shown = record, decoded
         for one in self._waiting:
             if one.wanted:
@@ -311,7 +311,7 @@ class Surroundings:
         return self._complete()
 
     def flush(self, found: Sequence[TrafficFinding] = ()) -> list[TrafficFinding]:
-        """Return all waiting findings, and findings that belong to no frame."""
+        """Return all waiting findings, and the given findings, which belong to no frame."""
         for finding in found:
             self._add(finding, None)
         for one in self._waiting:
@@ -377,7 +377,7 @@ class DecodedCheck:
         return found
 
     def wait(self, now_us: int, has_clock: bool) -> list[TrafficFinding]:
-        """Return overdue frames, and findings that have waited too long, while no frame arrives.
+        """Return findings about overdue frames, and waiting findings, while no frame arrives.
 
         Args:
             now_us: time at the source by the clock of this machine.
@@ -496,7 +496,7 @@ class Alarms:
             self._found(finding)
 
     def check_missing(self, now_us: int, lost: int = 0) -> None:
-        """Check which frames are missing now.
+        """Check which frames are missing now, and update the alarms.
 
         Args:
             now_us: current time on the clock of the frames.
@@ -565,7 +565,7 @@ _NO_FRAME: Final = "no frame"
 
 
 def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
-    """Return a head, a line for each rule, and then the findings. The latest finding is first."""
+    """Return lines of text: a header, a line for each rule, and the findings, the latest first."""
     rows = alarms.rows()
     least, most = _RULE_WIDTHS
     width = min(most, max([least, *(len(alarm.rule) for alarm in rows)]))

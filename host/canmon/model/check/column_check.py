@@ -70,7 +70,7 @@ class ColumnChecker:
         self._last_us, self._begun = 0, False
 
     def take(self, columns: Columns) -> list[TrafficFinding]:
-        """Return the violations in a block of frames, and in the seconds that they completed."""
+        """Check a block of frames, and the seconds that it completed. Return the violations."""
         if len(columns) and not self._begun:
             self._begun = True
             for rule in self._made:
@@ -93,7 +93,7 @@ class ColumnChecker:
         return [finding for _, _, finding in placed]
 
     def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[TrafficFinding]:
-        """Return missing frames at the end of the traffic.
+        """Return findings about frames that are missing at the end of the traffic.
 
         Args:
             lost: report of the source about lost frames and items that are not frames.

@@ -165,7 +165,7 @@ class _Windows(NamedTuple):
     spreads: Sequence[int]
 
     def spreads_of(self, period_us: int, usual: int) -> Sequence[int]:
-        """Return the spreads of the windows with a period."""
+        """Return the spreads of the windows whose period is about the given one."""
         if not isinstance(self.middles, list):
             spreads: Any = self.spreads
             return spreads[_are_alike(self.middles, period_us, usual)]  # type: ignore[no-any-return]

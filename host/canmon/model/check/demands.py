@@ -36,12 +36,12 @@ class RuleEvent:
     has_node: bool = False
 
     def carriers(self) -> Callable[[Decoded], bool]:
-        """Return a function that returns whether a frame carries a given signal."""
+        """Return a function that returns whether a frame contains one of the named signals."""
         finders = [signal_reader(path) for path in self.paths]
         return lambda decoded: any(find(decoded) is not None for find in finders)
 
     def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
-        """Return a function that finds the value of a frame, or the first value of its kind."""
+        """Return a function that finds the named signal in a frame, or else its first signal."""
         matches = self.matches
         if self.is_signal:
             finders = [signal_reader(path) for path in self.paths]
@@ -118,11 +118,11 @@ class RuleDemand:
         return None
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Return a frame that has not arrived until `due_us`, once."""
+        """Report once that a frame has not arrived by `due_us`."""
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Return missing frames at the end.
+        """Return a description of each frame that is missing at the end.
 
         Args:
             end_us: the end of the traffic, or the current time if it continues.
@@ -138,7 +138,7 @@ MOST_COUNTED: Final = 10_000
 
 
 class Truth(RuleDemand):
-    """A condition on signals that must never be true, or always.
+    """Demand that a condition on signals is always true, or never true.
 
     A violation is reported when it starts, not with each frame.
 
@@ -171,7 +171,7 @@ class Truth(RuleDemand):
 
 
 class Never(RuleDemand):
-    """Demand that no such frame arrives. Each such frame is reported.
+    """Demand that certain frames never arrive. Each such frame is reported.
 
     Args:
         event: frames that must not arrive.
@@ -218,7 +218,7 @@ class Count(RuleDemand):
 
 
 class Rate(RuleDemand):
-    """A limit of the number of frames in any span of time.
+    """A limit of the number of frames in any span of time of a given length.
 
     Args:
         event: frames to count.
@@ -233,10 +233,7 @@ class Rate(RuleDemand):
         self._times_us: deque[int] = deque(maxlen=most + 1)
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Check the time since the frame that must be outside of the span.
-
-        After a report, count again.
-        """
+        """Report a frame that exceeds the limit. After a report, the count restarts."""
         self.judged = True
         if not self._event.matches(record, decoded):
             return None
@@ -271,9 +268,9 @@ _NodeOnBus = tuple[str, int | None]
 
 
 class Dlc(RuleDemand):
-    """Demand on the length of frames, by CiA 301 or the mapping of a PDO.
+    """Demand that frames have the length that CiA 301 or the mapping of a PDO defines.
 
-    A PDO with an unknown mapping and remote frames are not judged.
+    Remote frames, and PDOs with an unknown mapping, are not judged.
 
     Args:
         event: frames to judge.
@@ -390,7 +387,7 @@ class Toggle(RuleDemand):
 
 
 class Every(RuleDemand):
-    """Demand on the time between frames of an identifier.
+    """Limits of the time between two frames of an identifier.
 
     The first frame after a boot-up may be late.
 
@@ -452,7 +449,7 @@ class Every(RuleDemand):
 
 
 class FirstWithin(RuleDemand):
-    """Demand for a frame within a time after the beginning of the traffic or of the scope.
+    """Demand that a frame arrives within a time after the traffic, or the rule's scope, begins.
 
     Args:
         event: frame that must arrive.
@@ -539,7 +536,7 @@ class _DeadlineDemand(RuleDemand):
 
 
 class Latency(_DeadlineDemand):
-    """Demand for an event within a time after another event.
+    """Demand that a second event follows a first event within a time.
 
     If the first event occurs again before the second one, time counts from its earlier occurrence.
     If the events name no node, both must come from frames of the same node.
@@ -557,7 +554,7 @@ class Latency(_DeadlineDemand):
         self.doubt = f"no {first.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Close the deadlines that the frame meets, then begin new ones."""
+        """End the deadlines that the frame meets, then start new ones."""
         node = decoded.node if self._by_node else None
         if self._second.matches(record, decoded):
             self._close((record.channel, node))
@@ -583,7 +580,7 @@ class Answered(_DeadlineDemand):
         self.doubt = f"no request of {event.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Close the deadlines of requests that are answered or replaced, then begin new ones."""
+        """End the deadlines of requests that are answered or replaced, then start new ones."""
         is_sdo = decoded.kind == "sdo"
         if not (is_sdo or decoded.kind in ("guard", "heartbeat", "boot-up")):
             return None
@@ -656,7 +653,7 @@ class Follow(RuleDemand):
     """Demand that compares each value with the previous value of the same identifier.
 
     Args:
-        event: event with the meaning of `In.event`.
+        event: signal, or kind of frames, as in `In`.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -709,7 +706,7 @@ class Steps(Follow):
     """A limit of the change of a value from one frame to the next.
 
     Args:
-        event: event with the meaning of `In.event`.
+        event: signal, or kind of frames, as in `In`.
         most: largest allowed change.
     """
 
@@ -729,7 +726,7 @@ class Changes(RuleDemand):
     """Demand that a value changes within a time. A violation is reported once.
 
     Args:
-        event: event with the meaning of `In.event`.
+        event: signal, or kind of frames, as in `In`.
         most_us: longest time without a change.
     """
 

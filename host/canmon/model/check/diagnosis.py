@@ -201,7 +201,7 @@ class Diagnoser:
         self.kept = FrameKeeper()
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Take frames in the order of the log, as a block of columns or as records."""
+        """Add frames in the order of the log, given as a block of columns or as records."""
         self.kept.take(frames)
 
     def diagnosis(
@@ -772,7 +772,7 @@ class _BusJudge:
     # The usual traffic
 
     def summary(self) -> learnt.BusSummary:
-        """Return the usual traffic on the bus, after `faults` was called."""
+        """Return a summary of the traffic on the bus. Call `faults` first."""
         bus, frames = self._bus, {}
         sync = self._rhythm_of(node_events.SYNC_ID)
         for ident, rows in self._rows.items():

@@ -186,7 +186,7 @@ Learnt = Mapping[str, LearntBus]
 
 
 def usual_text(hit: Hit) -> str:
-    """Return a finding in the notation of usual findings in a rule file."""
+    """Return a finding as text, as a rule file lists usual findings."""
     where = f"node {hit.node}: " if hit.node is not None else ""
     return f"{hit.rule}: {where}{hit.text}"
 
@@ -202,7 +202,7 @@ def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
 
 
 def learnt_text(summaries: Iterable[BusSummary], head: Sequence[str]) -> str:
-    """Return rules as TOML.
+    """Return the rules learnt from a good log as TOML.
 
     Args:
         summaries: summaries of all buses of the good log.
@@ -250,7 +250,7 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
 def scanned_text(
     bus: str, nodes: Mapping[int, tuple[Sequence[int | None], int | None]], head: Sequence[str]
 ) -> str:
-    """Return the values that were read from nodes as rules.
+    """Return rules as TOML, made from values that were read from nodes.
 
     Args:
         bus: name of the bus.

@@ -165,7 +165,7 @@ def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) 
 
 
 class BusEvents:
-    """Examination of the service frames of a bus, one by one, which collects their content.
+    """Analysis of the service frames of a bus, one by one. It collects events and findings.
 
     Args:
         bus: frames of the bus.
@@ -175,7 +175,7 @@ class BusEvents:
 
     Attributes:
         nodes: traffic of each node by node-ID.
-        hits: findings of the examination.
+        hits: findings of the analysis.
         cuts: changes of the rhythm of frames.
         commanded: whether the log contains an NMT command.
     """
@@ -235,7 +235,7 @@ class BusEvents:
             self._latest_sdo[node] = row
 
     def end(self, end_us: int) -> None:
-        """Judge the results that are known after all frames."""
+        """Report findings that are known only after the last frame."""
         for transfer in self._decoder.pending(end_us):
             if transfer.duration_us > _PATIENCE_US or WRONG_TOGGLE in transfer.flaws:
                 self._transfer(end_us, transfer)

@@ -60,7 +60,7 @@ class TrafficFinding(NamedTuple):
         return self._line(f"({seconds}.{micros:06d})")
 
     def shown(self, lines: DumpLines | None) -> str:
-        """Return the finding with its frames. `None` shows times since the epoch."""
+        """Return the finding and its frames as text. Without `lines`, times are since the epoch."""
         head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
         if not self.around:
             return head
@@ -152,7 +152,10 @@ ONE_TIME: Final = "all frames have one time"
 
 
 class Rule:
-    """One rule. This base class sees all frames that it wants, and reports nothing at the end.
+    """Base class of rules.
+
+    By default, a rule judges all frames of the identifiers that it wants, and reports nothing at
+    the end.
 
     Attributes:
         name: name of the rule in findings and reports.
@@ -161,9 +164,9 @@ class Rule:
     name = ""
 
     def wants(self, ident: int, /) -> bool:
-        """Return whether frames of an identifier matter to the rule.
+        """Return whether the rule needs the frames of an identifier.
 
-        Error frames have `ident.ERROR`.
+        The identifiers of error frames contain `ident.ERROR`.
         """
         raise NotImplementedError
 
@@ -185,10 +188,10 @@ class Rule:
         """Record the time of the first frame of all, before any frame is judged."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Return why the rule has judged nothing, so that it does not count as passed.
+        """Return the reason why the rule has judged nothing. It then does not count as passed.
 
-        A rule judges each frame that it wants. The absence of error frames also counts as judged. A
-        rule with its own `end` judges what is missing.
+        A rule has judged something if a frame that it wants has arrived. A rule about error frames,
+        or with its own `end`, also judges the absence of frames.
 
         Args:
             evidence: traffic with at least one frame or error frame.
@@ -206,7 +209,7 @@ class Rule:
         return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Return missing frames at the end of the traffic.
+        """Return a description of each frame that is missing at the end of the traffic.
 
         Args:
             latest_us: times of the last frame of each identifier, on any bus.
@@ -219,7 +222,7 @@ class Rule:
 
 
 class MaxLoad:
-    """Rule that no second of a bus has a higher load than the limit.
+    """Rule that limits the load of a bus in each second.
 
     Args:
         percent: limit of the load, in percent of the bit rate.
@@ -369,14 +372,14 @@ class _Watched:
         self.has_sent = self.guarded = self.requested = self.judged = False
 
     def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
-        """Take values of the node's objects from SDO traffic."""
+        """Store values of the node's objects that SDO traffic contains."""
         step = (self._sdo.request if request else self._sdo.response)(at_us, data)
         for transfer in step.ended:
             if self._memory.learn(transfer) and transfer.entry == self._heartbeat_time:
                 self._heartbeats.learn(at_us, transfer)
 
     def hear(self, at_us: int, data: bytes) -> str | None:
-        """Take a frame of error control. Return a finding if a heartbeat before it is lost."""
+        """Process a frame of error control. Return a finding if a heartbeat before it was lost."""
         self.has_sent = True
         if data[:1] == _BOOT_UP:
             self._memory.boot()
@@ -409,7 +412,7 @@ class _Watched:
         return doubted if keeps_eds else None
 
     def overdue(self, at_us: int) -> str | None:
-        """Report that the heartbeat of the node is lost at a time."""
+        """Return a finding if the heartbeat of the node is lost at this time."""
         beats = self._heartbeats
         period_us = None if self.guarded else beats.period_us
         if period_us is None or beats.since_us is None:
@@ -671,7 +674,7 @@ class NoErrorFrames(Rule):
 
 
 class KnownIds(Rule):
-    """Rule against other identifiers than these. Each other identifier is reported once per bus.
+    """Rule that only known identifiers occur. Each other identifier is reported once per bus.
 
     Args:
         idents: allowed identifiers as `ident_of` returns them.
@@ -708,9 +711,9 @@ _RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMM
 
 
 class NodesPresent(Rule):
-    """Rule that nodes are present.
+    """Rule that the given nodes are present.
 
-    A present node has sent a frame with one of its default COB-IDs.
+    A node is present if it has sent a frame with one of its default COB-IDs.
     """
 
     name = "nodes"
@@ -735,7 +738,7 @@ class NodesPresent(Rule):
 
 
 class NoReboot(_CanopenRule):
-    """Rule that no node that was already active boots without an NMT reset.
+    """Rule against boot-ups of active nodes without an NMT reset.
 
     Any frame that begins with 0 counts as a boot-up, because some nodes send more than one byte.
     """

@@ -50,7 +50,7 @@ class RuleScope:
     text = ""
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Process each frame. Return whether the frame is judged."""
+        """Process a frame. Return whether the rule judges it."""
         raise NotImplementedError
 
 
@@ -233,7 +233,7 @@ class ExpressionRule:
         return TrafficFinding(record.at_us, self.name, text, record)
 
     def advance(self, now_us: int) -> list[TrafficFinding]:
-        """Return frames that are overdue before a frame of this time. Listening continues."""
+        """Return findings about frames that are overdue at this time. The check continues."""
         if now_us <= self.due_us:
             return []
         self._found = True
@@ -243,7 +243,7 @@ class ExpressionRule:
         ]
 
     def end(self, end_us: int) -> list[TrafficFinding]:
-        """Return missing frames at a time. The state of the rule does not change."""
+        """Return findings about frames that are missing at a time. The rule keeps its state."""
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
@@ -487,9 +487,9 @@ _OTHERS: Final = frozenset(["not", "!", "!="])
 def errors_alone(
     test: filters.Test, tokens: Iterable[Token], signals: Collection[str]
 ) -> filters.Test:
-    """Return a test of frames as events. An EMCY with code 0000h is not an event for this test.
+    """Return the test of a filter, which EMCYs with code 0000h no longer pass.
 
-    Such an EMCY is an event if the filter does not name `emcy`, has a `not`, or names a signal,
+    The test is not changed if the filter does not name `emcy`, has a `not`, or names a signal,
     such as `emcy and code = 0`.
 
     Args:

@@ -73,7 +73,7 @@ class Rules:
         return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
     def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
-        """Return new rules for frames.
+        """Return a new `Rule` object for each rule that judges single frames.
 
         Args:
             eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.

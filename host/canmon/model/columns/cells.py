@@ -52,13 +52,13 @@ _MARK: Final = "\x01"
 
 
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return texts as numbers of one width, so that many texts can be looked up at once."""
+    """Return texts as an array of numbers, so that many texts can be looked up at once."""
     size = np.dtype(dtype).itemsize
     return np.array([text.encode() for text in texts], f"S{size}").view(dtype)
 
 
 def of(numbers: npt.NDArray[Any]) -> Cells:
-    """Return the characters of numbers from a table, with a row for each frame."""
+    """Return the characters of numbers that `table` made, with a row for each number."""
     return np.ascontiguousarray(numbers).view(np.uint8).reshape(len(numbers), -1)
 
 
@@ -91,7 +91,7 @@ def joined(count: int, parts: Sequence[Part]) -> str:
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
-    """Write one text in some rows, and another text in all other rows."""
+    """Return rows that contain one text where the mask is set, and the other text elsewhere."""
     width = max(len(text), len(other))
     both = np.array([other, text], f"S{width}")
     return of(both[:, np.newaxis])[rows.astype(np.int8)]
@@ -117,7 +117,7 @@ class Texts:
         self._wide: dict[int, str] = {}
 
     def put(self, rows: npt.NDArray[np.int64], texts: Cells) -> None:
-        """Set the texts of some rows. No text may be empty. One text counts for all rows."""
+        """Set the texts of some rows. No text may be empty. A single text is used for all rows."""
         if texts.shape[1] <= _WIDEST:
             self._pieces.append((rows, texts))
             return
@@ -130,7 +130,7 @@ class Texts:
 
     @cached_property
     def cells(self) -> Cells:
-        """The rows, with a mark in place of a wide text, and zeros in rows without a text."""
+        """The texts as rows of characters, with a mark for a wide text, and zeros for no text."""
         pieces = list(self._pieces)
         for found in (self._single, dict.fromkeys(self._wide, _MARK)):
             if found:
@@ -142,7 +142,7 @@ class Texts:
         return rows
 
     def lines(self, rows: slice, parts: Sequence[Part] = ()) -> str:
-        """Return the lines of some rows, with parts before their texts."""
+        """Return some rows as lines, each with the given parts before its text."""
         texts = self.cells[rows]
         found = joined(len(texts), [*parts, texts, b"\n"])
         if not self._wide or _MARK not in found:
@@ -179,7 +179,7 @@ class TextTable:
 
 
 def widened(rows: Cells, width: int) -> Cells:
-    """Return rows that have at least this many characters."""
+    """Return the rows, padded with zeros to at least this many characters."""
     if rows.shape[1] >= width:
         return rows
     wide = np.zeros((len(rows), width), np.uint8)
@@ -213,7 +213,7 @@ def whole(numbers: npt.NDArray[np.int64]) -> list[Part]:
 
 
 def hexadecimal(numbers: npt.NDArray[np.int64], count: int) -> Cells:
-    """Write the lower bytes of numbers, two digits for each of them."""
+    """Write the lowest `count` bytes of numbers, with two hex digits for each byte."""
     octets = numbers.astype(">u8").view(np.uint8).reshape(-1, 8)[:, 8 - count :]
     return of(_pairs()[octets])
 
@@ -271,9 +271,9 @@ class Scale(NamedTuple):
 
 
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
-    """Write floats that result from whole numbers.
+    """Convert whole numbers to floats, and write the floats as text.
 
-    Return the texts, and which of them are correct.
+    Return the texts, and a mask of the rows whose text is correct.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

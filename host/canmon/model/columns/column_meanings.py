@@ -68,7 +68,7 @@ class ColumnMeanings:
     """Decoder of blocks of frames.
 
     Args:
-        decoder: decoder of single frames. Other code may also feed it in between.
+        decoder: decoder of single frames. Other code may use it between two blocks.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -313,7 +313,7 @@ class _Lessons:
         self._boots = np.sort(np.concatenate(boots)) if boots else np.empty(0, np.int64)
 
     def next(self, begin: int) -> int:
-        """Return the first row that can change a meaning; the number of frames if none can."""
+        """Return the first row that can change a meaning, or the number of frames if none can."""
         end = len(self._idents)
         found = np.searchsorted(self._answers, begin)
         if found < len(self._answers):
@@ -686,7 +686,7 @@ _PIECE: Final = 1 << 10
 
 
 class ColumnNodes:
-    """Feed of a node board with blocks. The final result is the same as frame by frame.
+    """Updater of a node board from blocks of frames, with the same final result as frame by frame.
 
     `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
 
@@ -724,14 +724,14 @@ class ColumnNodes:
 
 
 def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
-    """Yield some frames as records, each with its row."""
+    """Yield the frames of some rows as records, each with its row."""
     for begin in range(0, len(rows), _PIECE):
         piece = rows[begin : begin + _PIECE]
         yield from zip(piece.tolist(), records(select(frames, piece)), strict=True)
 
 
 class Exchanges(NamedTuple):
-    """Expedited SDO transfers that add no knowledge. Each answer directly follows its request.
+    """Expedited SDO transfers without new information. Each answer directly follows its request.
 
     Attributes:
         requests: positions of the requests.
@@ -837,7 +837,7 @@ def of_sdo(ident: npt.NDArray[Any]) -> Ints:
 
 
 class Matter(NamedTuple):
-    """The frames that can change knowledge.
+    """The frames that can change what is known about nodes and CAN-IDs.
 
     Attributes:
         rows: rows of frames that can change the knowledge about nodes.

@@ -95,7 +95,7 @@ class _Objects:
 
 
 class BlfBlocks:
-    """Parser of containers. It is called with their contents and the time of the beginning in s."""
+    """Parser of BLF containers, called with the content and the time of the beginning in s."""
 
     def __init__(self, channels: ChannelNames) -> None:
         self._channels = channels
@@ -318,7 +318,7 @@ class CandumpBlock:
         return self._text[self.starts[row] : self._lines_end[row]].decode("latin-1")
 
     def take(self, rows: Rows, channels: ChannelNames) -> None:
-        """Write the rows of the lines that have the form of candump."""
+        """Fill the rows of lines that have exactly the form that candump writes."""
         marks, known = self._marks()
         rows.at_us[:], fits = self._stamps()
         known &= fits
@@ -456,10 +456,10 @@ class ColumnReader:
             yield rows.columns(self._channels)
 
     def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Read the file with the marks among its frames. Pieces with marks are returned as frames.
+        """Yield the file in pieces, as columns. A piece with marks is a list of frames and marks.
 
-        Pieces with CAN FD frames, and formats that cannot be read as columns, are returned as
-        frames, too.
+        Pieces with CAN FD frames, and formats that cannot be read as columns, are lists of frames,
+        too.
         """
         if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()

@@ -195,7 +195,7 @@ class _Frames(NamedTuple):
 
     @classmethod
     def of(cls, frames: Columns, rows: Ints, places: Ints, side: _Sides) -> _Frames:
-        """Find the pairs.
+        """Find the pairs of request and answer.
 
         Args:
             frames: frames of the bus.
@@ -278,13 +278,13 @@ class ColumnSdo:
         places: Ints,
         texts: cells.Texts,
     ) -> None:
-        """Decode SDO frames that teach nothing.
+        """Decode SDO frames from which the decoder learns nothing.
 
         Args:
             frames: frames of the bus.
-            speakers: channels, whether the client sends, and the rows of its frames.
+            speakers: channel, whether its client sends, and rows of the frames, of each sender.
             places: the row of each frame in the texts.
-            texts: the texts.
+            texts: texts to which the decoded frames are added.
         """
         known = self._bus.version
         if known != self._known or len(self._texts) + len(self._writers) > _MOST_TEXTS:
@@ -506,7 +506,7 @@ class _Talk:
         self.blocks = list[tuple[int, int]]()
 
     def follow(self, channel: SdoChannel, row: int, end: int) -> None:
-        """Follow a channel, whose frames are those of these rows."""
+        """Process the frames of a channel, which are those from `row` to before `end`."""
         dialogue = self._dialogue
         while row < end:
             if dialogue.kind[row] and dialogue.before[row] == channel.turn():
@@ -646,7 +646,7 @@ class _ValueText:
         self._tried = not valued
 
     def parts(self, values: _Words) -> list[cells.Part]:
-        """Return the text of each of some transfers."""
+        """Return the texts of transfers with these values."""
         if not self._tried and len(values) >= _FEW:
             self._try()
         if self._write is not None:

@@ -52,7 +52,7 @@ _Values = npt.NDArray[np.float64]
 
 
 class ColumnSurvey:
-    """Feed of a survey with blocks.
+    """Updater of a survey from blocks of frames.
 
     Args:
         decoder: decoder of the survey. Only DBC files may come before the standard.

@@ -41,7 +41,7 @@ Intermediate results of these lines fit into the cache.
 
 
 def fits(columns: Columns) -> bool:
-    """Return whether lines can be written at once. Unusual names of buses prevent this."""
+    """Return whether the frames can be written all at once, which unusual bus names prevent."""
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 
@@ -130,7 +130,7 @@ def log_lines(columns: Columns) -> str:
 
 
 class ScreenText:
-    """Writer of the same lines as `DumpLines`, used alternately with it.
+    """Writer that makes the lines of `DumpLines` for many frames at once, used alternately with it.
 
     Args:
         lines: writer of single frames.

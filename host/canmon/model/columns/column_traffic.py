@@ -54,7 +54,7 @@ _STUFFED: Final = np.array(can.STUFFED, np.int64)
 def column_bits(
     ident: npt.NDArray[np.uint32], dlc: npt.NDArray[np.uint8], payload: npt.NDArray[np.uint64]
 ) -> _Ints:
-    """Return the bits of each frame with stuff bits and interframe space.
+    """Return the number of bits of each frame, with stuff bits and interframe space.
 
     Args:
         ident: identifiers as `ident_of` returns them.
@@ -332,7 +332,7 @@ def _planes(counts: Ints) -> list[tuple[int, ...]]:
 
 
 class ColumnTraffic:
-    """Counter of all frames of all buses. Its memory grows with identifiers, not with frames."""
+    """Counter of all frames of all buses. Its memory grows with the identifiers, not the frames."""
 
     def __init__(self) -> None:
         self._buses: dict[str, _ColumnBus] = {}

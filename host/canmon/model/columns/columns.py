@@ -32,7 +32,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class NoColumnsError(ValueError):
-    """A log that cannot be columns because it contains CAN FD. Read the log frame by frame."""
+    """A log cannot be read as columns because it contains CAN FD. Read it frame by frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,7 +227,7 @@ class Runs:
 
 
 class Identifiers:
-    """Numbers of the identifiers of a bus by first appearance, used to sort blocks of frames.
+    """The identifiers of a bus, numbered by first appearance. The numbers sort blocks of frames.
 
     Attributes:
         idents: identifiers by number.

@@ -101,7 +101,7 @@ class Transfer:
     def described(  # noqa: PLR0913, PLR0917 - all that is known
         self, name: str, value: Value | None, text: str, length: str, unit: str, source: str
     ) -> Transfer:
-        """Return the same with what is known of its object; `replace` would be slow."""
+        """Return the transfer with name, value and unit of its object. `replace` would be slow."""
         return Transfer(
             self.at_us,
             self.duration_us,

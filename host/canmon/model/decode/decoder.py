@@ -110,7 +110,7 @@ _PRE_DEFINED: Final[dict[int, Route]] = {
 
 
 class Effect(IntEnum):
-    """The frames of a CAN-ID that can change the knowledge about nodes."""
+    """Which frames of a CAN-ID can change what is known about nodes."""
 
     NONE = 0
     LATEST = 1
@@ -177,10 +177,10 @@ class BusDecoder:
         return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
 
     def lasting(self, can_id: int) -> Route | None:
-        """Return a decoder of a CAN-ID that needs no earlier frames, or None if it needs them.
+        """Return the decoder of a CAN-ID, or None if the meaning depends on earlier frames.
 
-        The decoder is valid until `changes` grows. For error control, SDO and multiplexed PDOs,
-        earlier frames count.
+        The decoder is valid until `changes` grows. The meaning of error control, SDO and
+        multiplexed PDOs depends on earlier frames.
         """
         route = self._routed(can_id)
         told = route.func if isinstance(route, partial) else route
@@ -203,7 +203,7 @@ class BusDecoder:
     def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
         """Return the channel of a CAN-ID with SDO frames, and whether its client sends them.
 
-        It is valid until `changes` grows.
+        The result is valid until `changes` grows.
         """
         route = self._routed(can_id)
         if not isinstance(route, partial) or route.func != self._sdo:
@@ -212,7 +212,7 @@ class BusDecoder:
         return take.__self__, take.__name__ == "request"
 
     def error_control(self, can_id: int) -> int | None:
-        """Return the node whose heartbeats a CAN-ID carries, None if not any; valid as `sdo` is."""
+        """Return the node whose heartbeats have a CAN-ID, or None; valid until `changes` grows."""
         route = self._routed(can_id)
         if not isinstance(route, partial) or route.func != self._error_control:
             return None
@@ -225,12 +225,12 @@ class BusDecoder:
     def answers_guarding(self, node: int) -> bool:
         """Return whether a node answers guarding requests.
 
-        A node with a producer heartbeat time answers none (CiA 301, error control).
+        A node with a producer heartbeat time does not (CiA 301, error control).
         """
         return not self.memory(node).number(*node_memory.HEARTBEAT_TIME)
 
     def guard(self, node: int, *, requested: bool) -> None:
-        """Learn that the last frame of error control of a node was a guarding request, or not."""
+        """Record whether the last frame of error control of a node was a guarding request."""
         if requested:
             self._guarded.add(node)
         else:
@@ -303,7 +303,7 @@ class BusDecoder:
         return self.sdo_step(node, take(at_us, frame.data))
 
     def sdo_step(self, node: int, step: SdoStep) -> Decoded:
-        """Return what an SDO frame of a node does, and learn from it."""
+        """Return a decoded SDO frame of a node, and learn from the transfers that it ended."""
         if not step.ended:
             return Decoded(
                 *("sdo", node, step.text, (), "", step.entry), asks=step.asks, flaw=step.flaw
@@ -440,9 +440,10 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 
 
 def data_that_counts(route: Route) -> int:
-    """Return a mask of the data, a little-endian number, on which the text of a frame depends.
+    """Return a mask of the data bits on which the text of a frame depends.
 
-    If it is 0, the length does not count either.
+    The data are a little-endian number. If the mask is 0, the text does not depend on the length
+    either.
     """
     told = route.func if isinstance(route, partial) else route
     if told in (_unmapped, _raw):

@@ -340,7 +340,9 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Signals, and words that no built-in decoder produces, that have not occurred yet.
+    """Signals and words of filters that have not occurred in the traffic yet.
+
+    The words are those that no built-in decoder produces.
 
     Args:
         paths: names of signals as in filters: `position`, `3.position`, `statusword.fault`.

@@ -414,7 +414,7 @@ def _emcy(row: NodeStatus) -> str:
 def emcy_history(
     rows: Sequence[NodeStatus], stamp: Stamp = Stamp.ABSOLUTE, origin_us: int = 0
 ) -> list[str]:
-    """Return an empty line, a head, and the EMCYs of all nodes. The latest EMCY is first.
+    """Return lines of text: an empty line, a header, and the EMCYs of all nodes, the latest first.
 
     Without EMCYs, the function returns no lines.
 

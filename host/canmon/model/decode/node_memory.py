@@ -336,7 +336,7 @@ class NodeMemory:
             self._power_on[entry] = data
 
     def written(self, entry: Entry, data: bytes) -> None:
-        """Learn a value that was downloaded and confirmed."""
+        """Store the value of a confirmed download."""
         if entry[0] == STORE:
             if data == _SAVE:
                 # "save" makes all present values those of the next boot-up, the read ones
@@ -353,7 +353,7 @@ class NodeMemory:
             self._has_statusword = True
 
     def learn(self, transfer: decoded.Transfer) -> bool:
-        """Learn from a transfer that ended. Return whether it adds knowledge."""
+        """Store the value of a transfer that ended. Return False if it has no usable value."""
         entry, data = transfer.entry, transfer.data
         if (
             entry is None
@@ -525,7 +525,7 @@ PAIR_US: Final = 100_000
 
 
 class TwoBeats(NamedTuple):
-    """Two interleaved heartbeats, of which each keeps the period with every second frame.
+    """Two interleaved heartbeats with the same period. Each sends every second frame.
 
     Attributes:
         period_us: period of one heartbeat.

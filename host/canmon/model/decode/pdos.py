@@ -213,7 +213,7 @@ class PdoTable:
         return claims[min(claims)] if claims else None
 
     def update(self, pdo: NodePdo, memory: NodeMemory) -> set[int]:
-        """Update the knowledge about a PDO. Return the CAN-IDs whose meaning may be new."""
+        """Update what is known about a PDO. Return the CAN-IDs whose meaning may have changed."""
         before = self._can_ids.pop(pdo, None)
         if before is not None:
             del self._by_can_id[before][pdo]

@@ -127,13 +127,13 @@ class _OpenTransfer:
 
     @property
     def is_block_over(self) -> bool:
-        """Whether all segments of a block have come."""
+        """Whether all segments of a block have arrived."""
         self._take_run()
         heard = max(self._block, default=0)
         return heard in (self.block_last, self.block_size) and heard > 0
 
     def take_block_segment(self, segment: sdo_frame.BlockSegment) -> None:
-        """Keep a segment until its receipt says that it counts."""
+        """Keep a segment until the receiver acknowledges it."""
         self._take_run()
         self._block[segment.seqno] = segment.data
         if segment.last:
@@ -161,7 +161,7 @@ class _OpenTransfer:
             self._keep(_SEQNOS[: len(run) // sdo_frame.SEGMENT_BYTES], run)
 
     def acknowledge_block(self, ackseq: int) -> None:
-        """Take the segments that came in sequence; the others are sent again."""
+        """Accept the segments that arrived in sequence. The others are sent again."""
         if self._run and len(self._run) == ackseq * sdo_frame.SEGMENT_BYTES:
             self._run, run = b"", self._run
             self.data += run
@@ -458,10 +458,10 @@ class SdoChannel:
     # A reader of blocks takes frames that fit at once, and all others by `request` and `response`.
 
     def turn(self) -> int:
-        """Return which request and answer continue the dialogue, if the answer follows directly.
+        """Return a code for the request that continues the transfer with an immediate answer.
 
-        0 if no transfer runs, 1 and 2 for an upload segment with this toggle bit plus 1, 3 and 4
-        for a download segment with this toggle bit plus 3, -1 for anything else.
+        The code is 0 if no transfer runs, 1 or 2 for an upload segment with toggle bit 0 or 1, 3 or
+        4 for a download segment with toggle bit 0 or 1, and -1 for anything else.
         """
         running = self._running
         if running is None:
@@ -474,19 +474,19 @@ class SdoChannel:
         return (1 if upload else 3) + (taken is False)
 
     def received(self) -> tuple[int, int]:
-        """Return how many bytes of the running transfer have come, and its size, 0 if unknown."""
+        """Return the received bytes of the running transfer, and its size, or 0 if unknown."""
         running = self._running
         return (0, 0) if running is None else (len(running.data), running.size or 0)
 
     def runs(self) -> tuple[int, int] | None:
-        """Return the object of the running transfer, if it was answered and may still end well."""
+        """Return the object of the running transfer, or None if no transfer was answered."""
         running = self._running
         if running is None or running.phase is _TransferPhase.ASKED:
             return None
         return running.entry
 
     def take_segments(self, data: bytes, toggle: bool) -> None:
-        """Take segments with their answers, which continue the dialogue; `toggle` is the last."""
+        """Add segments that continue the transfer. `toggle` is the toggle bit of the last one."""
         running = self._running
         assert running is not None, "a transfer runs"
         running.data += data
@@ -495,23 +495,23 @@ class SdoChannel:
             running.requested_toggle = toggle
 
     def end_exchanges(self) -> None:
-        """Take transfers, each complete and without a repetition."""
+        """Record that transfers were completed without a repetition, so that none is running."""
         self._running = self._latest = None
 
     def block_from(self) -> TransferDirection | None:
-        """Return the direction of the segments of a block that come, before the last of them."""
+        """Return the direction of a running block whose last segment has not arrived, or None."""
         running = self._running
         if running is None or running.phase is not _TransferPhase.BLOCK:
             return None
         return running.direction if running.block_last is None else None
 
     def take_block(self, numbers: bytes, data: bytes, last: int | None) -> None:
-        """Take segments of a block.
+        """Add segments of a block.
 
         Args:
             numbers: number of each segment.
             data: data of the segments, 7 bytes for each.
-            last: number of the last segment of the transfer; None if this segment did not come.
+            last: number of the last segment of the transfer; None if it has not arrived.
         """
         running = self._running
         assert running is not None, "a transfer runs"

@@ -95,7 +95,7 @@ class _Bar(NamedTuple):
 
 
 def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Bar | None]:
-    """Return the samples in `columns` columns of equal time, with None for empty columns.
+    """Reduce the samples to `columns` columns of equal time, with None for empty columns.
 
     Args:
         series: samples of the signal.
@@ -130,7 +130,7 @@ class _Stop(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve for drawing, from stop to stop.
+    """A curve for drawing, with one stop for each column that has values.
 
     Attributes:
         label: displayed name of the curve.
@@ -304,7 +304,7 @@ def _area_of(series: Sequence[Series], width: int, height: int, title: str = "")
 def svg(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = ""
 ) -> str:
-    """Return a picture of a size in pixels.
+    """Return the picture as SVG, with width and height in pixels.
 
     The first axis is on the left, other axes on the right.
     """
@@ -435,7 +435,7 @@ _PAGE: Final = Path(__file__).with_name("page.html")
 def html_page(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = "canmon"
 ) -> str:
-    """Return a self-contained page. The page shows the values of a column as numbers."""
+    """Return the picture as a self-contained HTML page that also shows values as numbers."""
     area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
     curves: list[dict[str, object]] = [
@@ -779,7 +779,7 @@ class LiveGraph:
         return self._collector.series
 
     def add(self, word: CurveSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
-        """Show one more signal. Values of the signal in past frames are also taken."""
+        """Show one more signal, including its values in the given past frames."""
         fresh = Collector([word], None, MOST)
         for record, decoded in past:
             fresh.take_decoded(record, decoded)
@@ -827,7 +827,7 @@ class LiveGraph:
         return render(self.series, self.view(), width, height, colour=True)
 
     def show(self, mode: str) -> None:
-        """Change the view and remove the cursor. `HELD` stops the present view."""
+        """Change the mode of the view, and remove the cursor. `HELD` stops the present view."""
         self._held = self.view()
         self.mode, self.cursor_us = ViewMode(mode), None
 
@@ -843,9 +843,9 @@ class LiveGraph:
         self._hold(self.view().moved(fraction))
 
     def move_cursor(self, fraction: float) -> None:
-        """Move the cursor by a fraction of the view, which stops.
+        """Move the cursor by a fraction of the view. A moving view stops.
 
-        The cursor begins in the middle.
+        A new cursor begins in the middle.
         """
         view = self.view()
         middle_us = (view.from_us + view.to_us) // 2
@@ -860,7 +860,7 @@ class LiveGraph:
         self.axis = next((axis for axis in axes if axis > self.axis), axes[0])
 
     def stretch(self, factor: float) -> None:
-        """Zoom the axis by a factor. The middle of the axis stays where it is."""
+        """Zoom the vertical axis by a factor. The middle of the axis stays where it is."""
         low, high = self._range()
         middle, half = (low + high) / 2, (high - low) / 2 / factor
         self._set_range(middle - half, middle + half)

@@ -110,9 +110,9 @@ class FrameSlice:
         return self._number(data) * self.factor + self.offset
 
     def values(self, payload: NDArray[np.uint64]) -> NDArray[np.float64]:
-        """Return the values in many payloads of eight bytes.
+        """Return the value in each of many payloads of eight bytes.
 
-        A payload is one little-endian number.
+        A payload is given as a little-endian number.
         """
         import numpy as np  # noqa: PLC0415 - an extra
 
@@ -522,7 +522,7 @@ class Collector:
         self.take_decoded(record, wanted.take(record) if wanted else None)
 
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
-        """Process the values in a frame that is already decoded, or has no wanted objects."""
+        """Add the values in a frame that is already decoded, or has none of the wanted objects."""
         at_us, _, frame, _ = record
         if not isinstance(frame, ErrorFrame) and not frame.remote:
             key = frame.can_id | EXTENDED if frame.extended else frame.can_id
@@ -558,7 +558,7 @@ class Collector:
             self.take(record)
 
     def take_columns(self, columns: Columns) -> None:
-        """Take the values of slices from a block of a log."""
+        """Add the values of slices in a block of frames."""
         if self.first_us is None and len(columns):
             self.first_us = int(columns.at_us[0])
         for key, pairs in self._slices.items():
@@ -602,9 +602,9 @@ class _Sampler:
             series.label = f"{wanted.node}.{wanted.kind}"
 
     def take(self, record: Record, decoded: Decoded | None) -> int | None:
-        """Take a frame.
+        """Add the values in a frame.
 
-        For a signal of any node, return the node-ID of another node with the signal.
+        If the signal belongs to any node, and another node also sends it, return that node-ID.
         """
         if self.wanted.kind == LOAD:
             self._load(record)
@@ -699,7 +699,7 @@ class _Object:
         return self._word.text
 
     def take(self, at_us: int, decoded: Decoded) -> None:
-        """Take the value of the object if it is among the signals."""
+        """Add the value of the object if it is among the signals of the frame."""
         if self._found is None and len(self._known) < _MOST_HEARD:
             self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):

@@ -97,7 +97,7 @@ class _AscLines:
         self._now_us = 0
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame, the other content of the line, or None for a bad line."""
+        """Return a frame, a text for other valid content, or None for an invalid line."""
         timed = _TIMED.fullmatch(line)
         if timed is None:
             text = line.strip()

@@ -46,7 +46,7 @@ from tickrig.wire.errors import WireError
 
 
 def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | None:
-    """Return a frame, or None for impossible frames and times, which are counted."""
+    """Return the message as a frame. For an impossible frame or time, count it and return None."""
     try:
         at_us = log_file.to_us(message.timestamp)
     except ValueError:
@@ -101,7 +101,7 @@ class CanLogReader:
         return cast("Iterator[Record]", self.blocks(None))
 
     def blocks(self, apart: _TakeApart | None) -> Iterator[Record | BlfBlock]:
-        """Read the file. `apart` parses the containers of a BLF log and determines their form."""
+        """Read the file. `apart` parses the containers of a BLF log, and returns blocks."""
         self.tally = LogTally()
         names: dict[object, str] = {}
         for message in self._messages(apart):

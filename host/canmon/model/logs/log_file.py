@@ -50,7 +50,7 @@ _SAID: Final = re.compile(
 
 
 class Mark(NamedTuple):
-    """An event that is not a frame, at its place among the frames.
+    """An event among the frames of a log, such as lost frames or a bus that went away.
 
     Attributes:
         at_us: time of the event, or time on the clock of this machine if no frame gives the time.
@@ -69,7 +69,7 @@ class Mark(NamedTuple):
     away_us: int = 0
 
     def json(self) -> str:
-        """Return the mark as an object. Members without information are left out."""
+        """Return the mark as a JSON object. Members without information are left out."""
         import json  # noqa: PLC0415 - seldom wanted
 
         said: dict[str, object] = {"v": VERSION, "ev": self.event, "t": self.at_us / 1e6}
@@ -80,18 +80,18 @@ class Mark(NamedTuple):
 
 
 def dropped(at_us: int, frames: int) -> Mark:
-    """Return a mark that frames were lost here."""
+    """Return a mark for frames that were lost at this time."""
     return Mark(at_us, DROP, f"{frames} frames were lost", frames=frames)
 
 
 def gone(at_us: int, channel: str, why: str) -> Mark:
-    """Return a mark that a bus went away. `why` may begin with the name of the bus."""
+    """Return a mark for a bus that went away. `why` may begin with the name of the bus."""
     reason = _plain(why.removeprefix(f"{channel}: "))
     return Mark(at_us, GONE, f"{_plain(channel)} is gone: {reason}", channel)
 
 
 def back(at_us: int, channel: str, away_us: int) -> Mark:
-    """Return a mark that a bus is back."""
+    """Return a mark for a bus that is back."""
     away = f"{away_us // 1_000_000}.{away_us % 1_000_000:06d}"
     return Mark(at_us, BACK, f"{_plain(channel)} is back after {away} s", channel, away_us=away_us)
 
@@ -102,7 +102,7 @@ def triggered(at_us: int, why: str) -> Mark:
 
 
 def read_mark(at_us: int, text: str) -> Mark | None:
-    """Return the mark for these words of a log, or None for other words.
+    """Return the mark that a text of a log describes, or None for other texts.
 
     >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
     True
@@ -281,7 +281,7 @@ class LogFormatError(ValueError):
 
 
 class LogError(ValueError):
-    """A file that is not a log, or is truncated, or a format that cannot be written here."""
+    """The file is not a log, or is truncated, or its format cannot be written on this machine."""
 
 
 def log_format(path: Path) -> LogFormat:

@@ -92,7 +92,7 @@ _WRAP_US: Final = 1 << 32
 
 
 class ScreenClock:
-    """Clock that computes the time of a frame from the stamp before the frame.
+    """Clock that computes the time of a frame from the time stamp at the start of its line.
 
     Args:
         deltas: whether spans count from the previous frame (`-t d`), or from the first
@@ -109,9 +109,9 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return the clock of a text.
+        """Return the clock that fits the time stamps of a text.
 
-        The stamps are deltas if the first spans fall often or by much.
+        The stamps count from the previous frame if they often decrease, or decrease by much.
         """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
@@ -243,7 +243,7 @@ LONGEST: Final = 1 << 20
 
 
 class WholeLines:
-    """Buffer of an incomplete line. Time and memory do not grow with the number of pieces."""
+    """Buffer that joins received bytes to lines, at a cost that does not grow with the pieces."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -346,7 +346,7 @@ def is_usual(line: str) -> bool:
 
 
 def holds_frame(line: str) -> bool:
-    """Return whether a line is from `candump -L`, without a CAN FD frame or a mark."""
+    """Return whether a line has the form of `candump -L`, and no CAN FD frame or mark."""
     return "##" not in line and _LINE.fullmatch(line.strip()) is not None
 
 
@@ -369,7 +369,7 @@ class LogLines:
 
     @property
     def deltas(self) -> bool:
-        """Whether stamps count from frame to frame, so that times need all of the log."""
+        """Whether time stamps count from frame to frame, so that a time needs all earlier lines."""
         return self._clock is not None and self._clock.deltas
 
     def push(self, data: bytes, /) -> list[Record]:
@@ -450,7 +450,7 @@ def _mark(text: str) -> Mark | None:
 
 
 def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:
-    """Return frames with marks among them. Each mark follows a number of frames."""
+    """Insert marks among frames. Each mark comes with the number of frames before it."""
     if not marks:
         return records
     items, begin = list[Item](), 0

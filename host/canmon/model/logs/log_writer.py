@@ -41,7 +41,7 @@ class LogWriter(Protocol):
 
 
 class TextBlock(Protocol):
-    """Many frames that write themselves as lines at once. `column_text` implements this protocol.
+    """Many frames that can be written as lines at once. `column_text` implements this protocol.
 
     Attributes:
         first_us: time of the first frame.
@@ -106,7 +106,7 @@ _LINES: Final = {
 
 
 def comment(mark: log_file.Mark) -> str:
-    """Return a mark as a comment that programs skip when they read candump's logs."""
+    """Return a mark as a comment line, which programs that read candump's logs skip."""
     return f"# {mark.text}"
 
 
@@ -114,7 +114,7 @@ _MARKS: Final = {log_file.LogFormat.CANDUMP: comment, log_file.LogFormat.JSONL: 
 
 
 class TextLogWriter:
-    """A log in lines, in the format of candump, JSON or CSV."""
+    """Writer of a text log in the format of candump, JSON or CSV."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._file, self._lines = log_file.open_log(path, "wb"), list[str]()
@@ -164,7 +164,7 @@ class TextLogWriter:
 
 
 class CsvLogWriter(TextLogWriter):
-    """Rows below a header. The rows do not name their bus."""
+    """Writer of a CSV log, with rows below a header. The rows do not name their bus."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
@@ -193,7 +193,7 @@ _NUMBERED: Final = re.compile(r"can([0-9]{1,3})")
 
 
 class BusNumbers:
-    """Numbers of buses in a log without names. `can3` is number 3, others take free numbers."""
+    """Numbers of buses, for a log without names. `can3` is number 3, others get free numbers."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
@@ -209,7 +209,7 @@ class BusNumbers:
         return self._numbers[channel]
 
     def messages(self, name: str) -> list[str]:
-        """Report the number of each bus whose name does not show it."""
+        """Report the number of each bus whose name does not contain this number."""
         return [
             f"{name}: {channel} became can{number}"
             for channel, number in self._numbers.items()
@@ -222,7 +222,7 @@ _GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,
 
 
 class GvretLogWriter(TextLogWriter):
-    """Rows as SavvyCAN reads them, with data frames of at most 8 bytes, and numbers of buses."""
+    """Writer of rows for SavvyCAN, with data frames of at most 8 bytes, and numbers of buses."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)

@@ -96,7 +96,7 @@ def drop_line(lost: int) -> str:
 
 
 def parse_json_line(text: str, tally: log_file.LogTally) -> Record | str | None:
-    """Return a frame, the name of an event, or None for anything else."""
+    """Return the frame or the name of the event in a line, or None for anything else."""
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
     try:
@@ -227,7 +227,7 @@ def gvret_row(record: Record, bus: int) -> str:
 
 
 def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
-    """Return a frame, the name of a header or of a counted item, or None.
+    """Return a frame, a name for a header or a counted item, or None for an invalid row.
 
     The row itself shows its format, which is that of python-can, `canmon dump --csv`, or SavvyCAN.
     """

@@ -82,7 +82,7 @@ def _option(code: int, value: bytes) -> bytes:
 
 
 def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield codes and values of whole options. `order` is `<` or `>`."""
+    """Yield code and value of each complete option. `order` is `<` or `>`, as in `struct`."""
     head, at = struct.Struct(f"{order}HH"), 0
     while at + head.size <= len(data):
         code, size = head.unpack_from(data, at)
@@ -115,7 +115,7 @@ _DATA_AT: Final = 8
 
 
 def packet(frame: AnyFrame) -> bytes:
-    """Return the packet of a frame, with 16 bytes, or 72 bytes for CAN FD."""
+    """Return a frame as the data of a packet: 16 bytes, or 72 bytes for CAN FD."""
     if isinstance(frame, can.FdFrame):
         flagged = frame.can_id | _EXTENDED * frame.extended
         return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
@@ -502,7 +502,7 @@ _BLOCK_FRAMES: Final = 256
 
 
 class PcapngWriter:
-    """A capture. Wireshark shows a mark as a comment of the frame after it.
+    """Writer of a pcapng capture. Wireshark shows a mark as a comment of the frame after it.
 
     Raises:
         LogError: the file is pcap, the predecessor of pcapng, which does not name its buses.
@@ -544,7 +544,7 @@ class PcapngWriter:
             self._give()
 
     def mark(self, mark: log_file.Mark, /) -> None:
-        """Record a mark at the next frame. For lost frames, also record their number."""
+        """Add a mark to the next frame. For lost frames, also add their number."""
         if mark.event == log_file.DROP:
             self._options += _option(_DROP_COUNT, struct.pack("<Q", mark.frames))
         self._comments += _option(_COMMENT, mark.text.encode())
@@ -555,7 +555,7 @@ class PcapngWriter:
         self._file.flush()
 
     def close(self) -> None:
-        """End the capture. Marks after the last frame are in statistics of the first bus."""
+        """End the capture. Marks after the last frame go into statistics of the first bus."""
         if self._file.closed:
             return
         try:

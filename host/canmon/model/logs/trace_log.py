@@ -28,7 +28,10 @@ _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
 class TraceLogWriter:
-    """A trace of the bus of the first frame, as a host sees it. Times count from this frame."""
+    """Writer of a trace of one bus, as a host sees it.
+
+    The first frame defines the bus and the origin of times.
+    """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._file, self._name = log_file.open_log(path, "wb"), path.name

@@ -67,9 +67,9 @@ class AtLimit(StrEnum):
 
 
 class TriggerSpan(NamedTuple):
-    """The length before or after a trigger, either a number of frames or a time.
+    """The span before or after a trigger, either a number of frames or a time.
 
-    The other is None.
+    The attribute that does not apply is None.
     """
 
     frames: int | None
@@ -335,7 +335,7 @@ class _RecordingPart:
         return self._writer.messages()
 
     def rescue(self) -> None:
-        """End the log after an error. Whole items stay, and half a frame after them is removed."""
+        """End the log after an error. Complete items stay. An incomplete last item is removed."""
         with suppress(OSError, ValueError):
             self._writer.close()
         with suppress(OSError):
@@ -421,7 +421,7 @@ class _Index:
         self._put(json.dumps(said, separators=(",", ":")))
 
     def mark(self, mark: log_file.Mark, file: str) -> None:
-        """Add a mark and the name of the file that contains it, which is empty for no file."""
+        """Add a mark to the index, with the name of its file, or an empty name for no file."""
         text = mark.json()
         self._put(f'{text[:-1]},"file":{json.dumps(file)}}}' if file else text)
 

@@ -43,10 +43,10 @@ class Trigger(Protocol):
     decodes: bool
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
-        """Return why a frame is a trigger, or an empty text if it is not."""
+        """Return the reason why a frame is a trigger, or an empty text if it is not."""
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Return why a missing or lost frame is a trigger."""
+        """Return the reason why a missing or lost frame is a trigger, or an empty text."""
 
     def messages(self) -> list[str]:
         """Return other notes about the trigger."""
@@ -239,7 +239,7 @@ class _Window:
 
 
 class Recorder:
-    """Recorder of frames that it receives.
+    """Recorder that writes received frames to files.
 
     Times are those of the source. Frames contain them, and `now_us` continues from the latest
     frame. If a file cannot be written, the recording ends. Later frames are counted as missing.

@@ -65,7 +65,7 @@ class _BoardColumn(NamedTuple):
 
 
 def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) -> list[Line]:
-    """Return a head, and a line for each node, as wide as the screen if possible.
+    """Return lines of text: a header, and a line for each node, as wide as the screen if possible.
 
     Args:
         rows: nodes of the board.

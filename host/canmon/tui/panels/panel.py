@@ -70,7 +70,7 @@ class ChoiceView(LineView):
         self._rows: list[Line] = []
 
     def show(self, lines: Sequence[Line], begin: int = 0, total: int | None = None) -> None:
-        """Show lines, which are all lines of the list."""
+        """Show all lines of the list. `begin` and `total` have no effect."""
         self._rows = list(lines)
         self.chosen = min(self.chosen, max(0, len(lines) - 1))
         marked = [

@@ -77,7 +77,7 @@ class TransmitTask(Task):
         self.words.append(words)
 
     def change(self, number: int, words: transmit.RowText) -> None:
-        """Replace a row, which is no longer sent. Raise ValueError as `add` does."""
+        """Replace a row. The old row is no longer sent. Raise ValueError as `add` does."""
         self.list.rows[number] = words.row(self._pdos)
         self.words[number] = words
 
