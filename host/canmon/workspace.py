@@ -61,7 +61,7 @@ class Workspace:
         path: path of the file, or None for settings that are not stored.
 
     Raises:
-        WorkspaceError: the text is not TOML, and the message names the line. Or tomlkit is not
+        WorkspaceError: the text is not TOML (the message names the line), or tomlkit is not
             installed.
     """
 
@@ -389,7 +389,7 @@ class PanelSettings:
         self._conflict = ""
 
     def load(self) -> None:
-        """Pass its settings to each panel.
+        """Pass to each panel its settings from the workspace.
 
         Raises:
             WorkspaceError: a setting is wrong. The message names its line.
@@ -409,7 +409,7 @@ class PanelSettings:
         return words
 
     def save(self) -> str:
-        """Write changed settings. Return an error only once.
+        """Write changed settings. Return an error text, but the same error only once.
 
         If another program has changed the file, the file is not written until the user exports the
         settings.
@@ -485,9 +485,9 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 
 @contextmanager
 def below(*path: str | int) -> Iterator[None]:
-    """Report errors of nested settings with the whole path.
+    """Extend the path of a SettingError in the block by the given path.
 
-    Any other ValueError is reported for the path itself.
+    Any other ValueError becomes a SettingError of the given path.
     """
     try:
         yield

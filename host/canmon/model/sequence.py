@@ -290,7 +290,7 @@ class SequenceRun:
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return self._pause.until_us
 
     def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
@@ -482,7 +482,7 @@ class _Wrong(Exception):  # noqa: N818 - never leaves this file
 
 
 class TomlSequence:
-    """Parser of one file.
+    """Parser of a sequence in a TOML file.
 
     Args:
         text: content of the file.

@@ -251,7 +251,7 @@ class Survey(NodeBoard):
         values: values of signals in bins.
         lanes: lanes of nodes by bus and node-ID.
         signals: signals by name.
-        signals_left: names of signals for which there was no room.
+        signals_left: names of signals that were left out because there were too many.
     """
 
     def __init__(
@@ -341,7 +341,7 @@ class Survey(NodeBoard):
             self._take_signal(name, since_us, signal, decoded.source)
 
     def track(self, name: SignalName, unit: str, source: str) -> SignalTrack | None:
-        """Return the track of a signal, or None if there is no room for one more."""
+        """Return the track of a signal, or None if there are too many signals."""
         track = self.signals.get(name)
         if track is None:
             if len(self.signals) >= _MOST_SIGNALS:

@@ -75,7 +75,7 @@ class _Counter:
     high: int
 
     def put(self, data: bytes, number: int) -> bytes:
-        """Return the data of the frame with this number, which counts from 0."""
+        """Return the data with new field values for transmission `number`, from 0."""
         value = self.low + number % (self.high - self.low + 1)
         mask = (1 << self.bits) - 1 << self.shift
         byte = data[self.byte] & ~mask | value << self.shift
@@ -109,7 +109,7 @@ class _ChecksumField:
 
 @dataclass(frozen=True, slots=True)
 class FrameFields:
-    """The changing fields of a frame. Checksums come after counters, in their order."""
+    """The fields of a frame that change each time. Counters are set first, then checksums."""
 
     counters: tuple[_Counter, ...] = ()
     checksums: tuple[_ChecksumField, ...] = ()
@@ -125,7 +125,7 @@ class FrameFields:
             )
 
     def put(self, data: bytes, number: int) -> bytes:
-        """Return the data of the frame with this number, which counts from 0."""
+        """Return the data with new field values for transmission `number`, from 0."""
         for counter in self.counters:
             data = counter.put(data, number)
         for checksum in self.checksums:

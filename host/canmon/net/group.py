@@ -49,7 +49,7 @@ class _NetGroup(LazyGroup):
     """A group with SOURCE before its verbs, unless options name the bus."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Insert an empty SOURCE if a verb comes first."""
+        """Insert an empty SOURCE if the first argument is a verb."""
         args = spread(args)
         found, rest, _ = self.make_parser(ctx).parse_args(list(args))
         if found.get("source") in self.commands:

@@ -345,7 +345,7 @@ class _ValueDifference(NamedTuple):
 def differences(
     session: NetSession, objects: NamedObjects, values: Mapping[Entry, bytes]
 ) -> Iterator[_ValueDifference]:
-    """Read objects of a node. Yield the objects that differ. Raise SdoTimeout without an answer."""
+    """Read objects of a node. Yield those that differ. Raise SdoTimeout if it does not answer."""
     for entry, wanted in sorted(values.items()):
         row = objects.rows.get(entry)
         if row is not None and not row.readable:

@@ -151,7 +151,7 @@ _KINDS: Final = (".svg", ".html", ".png", ".csv")
 
 
 def check_graph_path(path: Path) -> None:
-    """Raise Refused if the name of a file indicates no known kind."""
+    """Raise Refused if the name of a file indicates no known format."""
     if path.suffix.lower() not in _KINDS:
         raise Refused(f"-o {path}: a graph is written as {', '.join(_KINDS)}")
 

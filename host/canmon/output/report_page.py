@@ -93,7 +93,7 @@ class ReportHead:
 
 
 def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
-    """Return the page. The same values give the same bytes."""
+    """Return the HTML page. The same arguments always give exactly the same text."""
     style, script = (_HERE.joinpath(f"page.{kind}").read_text("utf-8") for kind in ("css", "js"))
     parts = {
         "policy": escape(content_policy(style, script)),

@@ -82,7 +82,7 @@ class SocketReader:
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Record]:
-        """Wait for a first frame. Raise LinkClosed if the bus is gone."""
+        """Wait for frames, and return them. Raise LinkClosed if the bus is gone."""
         records: list[Record] = []
         ready([self._socket], wait_s=timeout_us / 1e6)
         try:
@@ -199,7 +199,7 @@ class BusReader:
         self.reads = BusReceiver(bus, name)
 
     def read(self, timeout_us: int, /) -> list[Record]:
-        """Wait for a first frame. Raise LinkClosed if the bus is gone."""
+        """Wait for frames, and return them. Raise LinkClosed if the bus is gone."""
         records: list[Record] = []
         faults, wait_us = self.reads.faults, timeout_us
         try:

@@ -47,7 +47,7 @@ _UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PRO
 
 
 class RtcLiteLine:
-    """Decoder of both directions of a line to an RTC-Lite device. Chunking makes no difference.
+    """Decoder of both directions of a line to an RTC-Lite device, for bytes in chunks of any size.
 
     Args:
         channel: name of the line.
@@ -63,7 +63,7 @@ class RtcLiteLine:
         self._received_us = {True: 0, False: 0}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
-        """Take bytes of one direction. Return the frames that are now complete."""
+        """Process bytes of one direction. Return the frames that are now complete."""
         decoder, gap_us = self._decoders[to_device], at_us - self._received_us[to_device]
         if gap_us >= (_LOST_GAP_US if decoder.lost else _FRAME_GAP_US):
             decoder.clear()
@@ -151,7 +151,7 @@ _KIND: Final = "rrc"
 
 
 class RrcLines:
-    """Decoder of both directions of a line to an RRC. Chunking makes no difference.
+    """Decoder of both directions of a line to an RRC, for bytes in chunks of any size.
 
     Args:
         channel: name of the line.
@@ -162,7 +162,7 @@ class RrcLines:
         self._splitters = {True: LineSplitter(), False: LineSplitter()}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
-        """Take bytes of one direction. Return the lines that are now complete."""
+        """Process bytes of one direction. Return the lines that are now complete."""
         decode = _decode_command if to_device else _decode_reply
         return [
             LineRecord(at_us, self._channel, to_device, line, decode(line))

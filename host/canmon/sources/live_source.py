@@ -51,7 +51,7 @@ class Reader(Protocol[_Read_co]):
         """Number of frames that the driver reports as dropped."""
 
     def read(self, timeout_us: int, /) -> Sequence[_Read_co | Mark]:
-        """Wait for a first frame. Raise LinkClosed if the bus is gone.
+        """Wait for frames, and return them. Raise LinkClosed if the bus is gone.
 
         A mark at the beginning of the result means that the bus went away or is back.
         """
@@ -220,7 +220,7 @@ def _monotonic_us() -> int:
 
 
 class ReopeningReader(Generic[_Item]):
-    """A reader that uses several readers in turn. It uses each one until its bus is gone.
+    """A reader that opens its bus again. It uses one reader until the bus is gone, then the next.
 
     Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and then
     read without an error. Opening alone is not enough, because a SocketCAN bus that is down can be
@@ -266,7 +266,7 @@ class ReopeningReader(Generic[_Item]):
         return self._gone_us is not None
 
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
-        """Wait for a first frame. Add marks when the bus goes away and when it is back.
+        """Wait for frames, and return them, with marks when the bus goes away and when it is back.
 
         Raises:
             LinkClosed: the bus is gone, and `wanted` is not set.

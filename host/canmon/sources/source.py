@@ -200,7 +200,7 @@ class LineSpec:
 
 
 def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
-    """Read a SOURCE word. None stands for standard input.
+    """Read a SOURCE word. Return None for standard input.
 
     Raises:
         Refused: the word is not a SOURCE.
@@ -532,7 +532,7 @@ _READ_BYTES: Final = 1 << 16
 
 
 class StdinSource(_LoggedSource):
-    """A pipe, a terminal, or a file that another program writes."""
+    """Standard input: a pipe, a terminal, or a file that another program writes."""
 
     live = True
 
@@ -679,7 +679,7 @@ def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
 
 
 def piece_log(words: Sequence[str], cut: LogCut = _WHOLE) -> PieceLog | None:
-    """Open the log that SOURCE words name in pieces. None and errors are as in `block_log`."""
+    """Open the log that SOURCE words name, to read it in pieces; see `block_log`."""
     path = None if cut.earlier else _large_log(words)
     return None if path is None else PieceLog(path, cut)
 
@@ -790,5 +790,5 @@ def open_live(
 
 
 def is_live(word: str) -> bool:
-    """Return whether a SOURCE word names something without an end, which is not a log file."""
+    """Return whether a SOURCE word names a source without an end: anything but a log file."""
     return not isinstance(parse_source(word), FileSpec)

@@ -85,7 +85,7 @@ class RecorderTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return self._due_us
 
     @property

@@ -153,7 +153,7 @@ class Task(Protocol):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call without a frame, or `NEVER`."""
+        """Time at which the next call is due, even if no frame arrives, or `NEVER`."""
         return NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:

@@ -99,7 +99,7 @@ class MonitorSettings:
 
 @contextmanager
 def of_field(name: str) -> Iterator[None]:
-    """Report errors in the block as errors of a field."""
+    """Turn errors in the block into an InputError of a field."""
     try:
         yield
     except InputError:

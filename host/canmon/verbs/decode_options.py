@@ -204,7 +204,7 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
 
 
 def refuse_idle_of_bus(source: Sequence[str]) -> None:
-    """Raise Refused for options that open a bus if SOURCE words do not name a bus."""
+    """Raise Refused if options for a bus are given, but the SOURCE words name no bus."""
     words = [word for word in source if not word.endswith(".toml")]
     parsed = [parse_source(word) for word in words]
     if not parsed:

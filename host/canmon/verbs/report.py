@@ -245,7 +245,7 @@ class _Seen:
         self._end(source)
 
     def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
-        """Return the frames around some frames, as `excerpts` does. The log was read in blocks."""
+        """Return the frames around frames by their numbers, as `excerpts` does."""
         return {number: self._diagnoser.kept.around(number, frames) for number in numbers}
 
     def _end(self, source: AnySource[Any]) -> None:
@@ -319,7 +319,7 @@ class _Reading:
             self.source = source
 
     def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
-        """Return the frames around some frames by their numbers, as `excerpts` does."""
+        """Return the frames around frames by their numbers, as `excerpts` does."""
         return excerpts(self._pieces(), numbers, frames) if numbers else {}
 
     def close(self) -> None:

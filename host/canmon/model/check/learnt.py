@@ -192,7 +192,7 @@ def usual_text(hit: Hit) -> str:
 
 
 def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
-    """Return the rules of a bus. If there is only one bus, its name does not matter."""
+    """Return the rules of a bus. If there is only one bus, its name is ignored."""
     if len(learnt) == buses == 1:
         return next(iter(learnt.values()))
     return learnt.get(name)
@@ -290,7 +290,7 @@ def parse_learnt(text: str) -> Learnt | None:
     """Read learnt rules. Return None if the file has other rules.
 
     Raises:
-        ValueError: the file has an error. The message names the place of the error.
+        ValueError: the file has an error. The message locates the error.
     """
     words = load_toml(text)
     if "learnt" not in words:

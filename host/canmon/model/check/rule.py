@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class TrafficFinding(NamedTuple):
-    """A violation of a rule, with place and time.
+    """A violation of a rule, with its time and the frame that shows it.
 
     Attributes:
         at_us: time at which the violation was detected.

@@ -686,7 +686,7 @@ _PIECE: Final = 1 << 10
 
 
 class ColumnNodes:
-    """Updater of a node board from blocks of frames, with the same final result as frame by frame.
+    """Updates a node board from blocks of frames. The final result is that of single frames.
 
     `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
 

@@ -200,7 +200,7 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: the row of each frame in the texts.
+            places: row of each frame in the texts.
             side: channel, node and sender of each frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
@@ -283,7 +283,7 @@ class ColumnSdo:
         Args:
             frames: frames of the bus.
             speakers: channel, whether its client sends, and rows of the frames, of each sender.
-            places: the row of each frame in the texts.
+            places: row of each frame in the texts.
             texts: texts to which the decoded frames are added.
         """
         known = self._bus.version

@@ -52,10 +52,10 @@ _Values = npt.NDArray[np.float64]
 
 
 class ColumnSurvey:
-    """Updater of a survey from blocks of frames.
+    """Updates a survey from blocks of frames.
 
     Args:
-        decoder: decoder of the survey. Only DBC files may come before the standard.
+        decoder: decoder of the survey. Its `first` decoders may only be DBC files.
         survey: survey to feed. No other code may feed the survey.
     """
 

@@ -144,7 +144,7 @@ class ScreenText:
 
         Args:
             columns: frames to write.
-            meanings: text after each frame, empty for no text. None stands for frames without any
+            meanings: text after each frame, empty for no text. None if no frame has a
                 text.
         """
         for begin in range(0, len(columns), _SLAB):
@@ -210,7 +210,7 @@ class ScreenText:
 
 
 class ColumnText:
-    """Frames for a writer of a log, with at least one frame; see `TextBlock`.
+    """Block of at least one frame for a writer of a log; see `TextBlock`.
 
     Args:
         columns: frames to write.

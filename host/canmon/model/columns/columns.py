@@ -206,7 +206,7 @@ class Runs:
         ends: end of each run in `order`, which is the index after its last row.
         numbers: number of each run's identifier.
         fresh: whether a run begins with the first frame of its identifier.
-        gaps_us: gap before each row of `order`, or 0 before a first frame, and if time goes back.
+        gaps_us: gap before each row of `order`, or 0 before a first frame or if time goes back.
     """
 
     order: Ints
@@ -283,7 +283,7 @@ class Identifiers:
 
 
 def grown(column: Numbers, count: int) -> Numbers:
-    """Return a column with this many rows. New rows are 0."""
+    """Return a column, extended to `count` rows. New rows are 0."""
     if len(column) == count:
         return column
     rows = np.zeros((count, *column.shape[1:]), column.dtype)

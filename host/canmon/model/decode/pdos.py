@@ -235,7 +235,7 @@ def _pdo_of(node: int, index: int) -> NodePdo:
 
 
 def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
-    """Return the PDOs to which some objects belong."""
+    """Return the PDOs that objects with these indices configure."""
     return {_pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
 
 

@@ -341,7 +341,7 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
 
 
 def state_colour(band: Band, name: str) -> str:
-    """Return the colour of a state, which is its own or one of the free colours in turn."""
+    """Return the colour of a state: the fixed colour of a known state, or else a free colour."""
     names = dict.fromkeys(run.name for run in band.runs if run.name not in _KNOWN_STATES)
     if name not in names:
         return _KNOWN_STATES[name]

@@ -501,7 +501,7 @@ class Collector:
         return [one.text for one in self._objects if not one.is_found]
 
     def join(self, other: Collector) -> None:
-        """Take over the signals and the samples of another collector."""
+        """Add the signals and the samples of another collector."""
         self.series += other.series
         self._objects += other._objects
         self._samplers += other._samplers
@@ -604,7 +604,7 @@ class _Sampler:
     def take(self, record: Record, decoded: Decoded | None) -> int | None:
         """Add the values in a frame.
 
-        If the signal belongs to any node, and another node also sends it, return that node-ID.
+        If the signal names no node, return the node-ID of another node that sends it.
         """
         if self.wanted.kind == LOAD:
             self._load(record)

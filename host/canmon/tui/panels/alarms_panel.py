@@ -50,7 +50,7 @@ class AlarmTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return self._due_us
 
     def hold(self, rules: Rules) -> None:

@@ -68,7 +68,7 @@ class DictionaryTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return _NOW if self._out else min(self._dialogue.due_us, self._watch_us)
 
     def objects(self, node: _Node) -> NodeDictionary:

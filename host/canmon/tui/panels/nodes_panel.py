@@ -268,7 +268,7 @@ class _NodeTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return _NOW if self._out else self._due_us
 
     @property
@@ -392,7 +392,7 @@ class NodesPanel(Panel):
         self._card = [] if row is None else card_lines(row, self._rows, wide, stamp, origin_us)
 
     def paint(self) -> None:
-        """Show the snapshot. The board takes no more room than it needs."""
+        """Show the snapshot. The board is no higher than its rows require."""
         head, *rows = self._lines
         title, view = self.query_one("#head", TitleLine), self.query_one(ChoiceView)
         title.styles.text_style = "bold"

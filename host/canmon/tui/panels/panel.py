@@ -112,7 +112,7 @@ _Take = Callable[[str], None]
 
 
 class PromptLine(Vertical):
-    """A prompt that is hidden until a question is asked. Enter answers, Escape does not."""
+    """A prompt, hidden until a question is asked. Enter submits the answer, Escape leaves."""
 
     DEFAULT_CSS = """
     PromptLine { display: none; height: auto; }
@@ -171,7 +171,7 @@ class PromptLine(Vertical):
 
 
 class PictureView(LineView, inherit_bindings=False):
-    """A picture whose keys are those of the panel."""
+    """A view of a picture. It has no keys, so that the panel receives all keys."""
 
     class Pointed(Message):
         """Message that the picture was clicked.

@@ -123,7 +123,7 @@ class SequenceTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary without a frame."""
+        """Time at which the next call is due, even if no frame arrives."""
         return NEVER if self._run is None else self._run.due_us
 
     def parse(self, text: str, name: str) -> Steps:

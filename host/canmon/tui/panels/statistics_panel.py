@@ -55,7 +55,7 @@ class StatisticsPanel(Panel):
         self._lines: list[Line] = []
 
     def compose(self) -> ComposeResult:
-        """Lay out the heads, which do not scroll, and the rows."""
+        """Lay out the headers, which do not scroll, and the rows."""
         heads = LineView(id="heads")
         heads.can_focus = False
         yield heads

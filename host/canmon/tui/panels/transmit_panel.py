@@ -68,7 +68,7 @@ class TransmitTask(Task):
 
     @property
     def due_us(self) -> int:
-        """Time of the next call that is necessary."""
+        """Time at which the next call is due."""
         return _NOW if self._out else self.list.due_us
 
     def add(self, words: transmit.RowText) -> None:
