@@ -54,7 +54,7 @@ class WorkspaceError(ValueError):
 
 
 class Workspace:
-    """Settings by section.
+    """The settings of a workspace file, by section.
 
     Args:
         text: content of the file.

@@ -14,7 +14,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 
 def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of groups and ids of checks, split at commas.
+    """Return the given names of groups and ids of checks, split at commas.
 
     >>> patterns("NMT,HB"), patterns(["PR-*", "UE-01"])
     (('NMT', 'HB'), ('PR-*', 'UE-01'))

@@ -229,7 +229,7 @@ class Sequence:
 
     Attributes:
         steps: steps in order.
-        locate: function that returns `FILE:LINE` of a step.
+        locate: function that returns `FILE:LINE` of a place in the sequence.
     """
 
     steps: tuple[_FrameStep, ...]

@@ -156,7 +156,7 @@ class Stopwatch:
     """Clock that starts at the time of the latest frame, and runs with the clock of this machine.
 
     The clock of a driver's time stamps may differ from the clock of this machine. Therefore only
-    differences of stamps count.
+    differences between time stamps are used.
 
     Attributes:
         latest_us: time of the latest frame.

@@ -66,7 +66,7 @@ class SocketReader:
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
         tally: counts of items that are not frames.
-        stepped: whether time passes while the bus is read, which is always False.
+        stepped: whether virtual time passes while the bus is read, which is always False.
     """
 
     stepped = False
@@ -190,7 +190,7 @@ class BusReader:
         reads: reader of the bus, which also counts frames that the driver could not read.
         lost: number of lost frames, which is 0 because python-can does not report it.
         tally: counts of items that are not frames.
-        stepped: whether time passes while the bus is read.
+        stepped: whether virtual time passes while the bus is read.
     """
 
     def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:

@@ -244,8 +244,8 @@ class LineReader:
         name: name of the port.
         lost: number of lost bytes, which is 0 because a serial port does not report it.
         tally: counts of items, always empty because invalid bytes are reported as lines.
-        stepped: whether time passes while the port is read, which is False because its time is real
-            time.
+        stepped: whether virtual time passes while the port is read, which is False because its time
+            is real time.
 
     Raises:
         LinkClosed: the port cannot be opened.

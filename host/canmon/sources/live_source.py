@@ -38,8 +38,8 @@ class Reader(Protocol[_Read_co]):
     Attributes:
         name: name of the bus or port.
         tally: counts of items that are not frames.
-        stepped: whether time passes while the bus is read. Such a bus belongs to the thread that
-            opened it.
+        stepped: whether virtual time passes while the bus is read. Such a bus belongs to the thread
+            that opened it.
     """
 
     name: str
@@ -235,7 +235,7 @@ class ReopeningReader(Generic[_Item]):
     Attributes:
         name: name of the first reader.
         tally: counts of items that are not frames, of all readers.
-        stepped: whether time passes while the bus is read, which is always False.
+        stepped: whether virtual time passes while the bus is read, which is always False.
         wanted: whether to open the bus again.
         gaps: number of times that the bus went away.
     """

@@ -328,7 +328,7 @@ class _CutLog:
         yield from items
 
     def items(self, items: Sequence[Item]) -> list[Item]:
-        """Return the items of the part. Earlier items go to `LogCut.earlier`."""
+        """Return the items of the part. Earlier items are passed to `LogCut.earlier`."""
         if items and self._origin_us is None:
             self.note(items[0].at_us)
         passed: list[Item] = []

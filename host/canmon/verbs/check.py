@@ -93,7 +93,7 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count frames. The first call sets the origin of displayed times.
+        """Count frames. The first call may set the origin of displayed times.
 
         Args:
             frames: frames to count. There is at least one frame.

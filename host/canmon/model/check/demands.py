@@ -650,7 +650,7 @@ class In(RuleDemand):
 
 
 class Follow(RuleDemand):
-    """Demand that compares each value with the previous value of the same identifier.
+    """Base class of demands that compare a value with the previous one of the same identifier.
 
     Args:
         event: signal, or kind of frames, as in `In`.

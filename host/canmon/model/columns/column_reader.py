@@ -95,7 +95,7 @@ class _Objects:
 
 
 class BlfBlocks:
-    """Parser of BLF containers, called with the content and the time of the beginning in s."""
+    """Parser of BLF containers, called with their content and the start of the log in s."""
 
     def __init__(self, channels: ChannelNames) -> None:
         self._channels = channels

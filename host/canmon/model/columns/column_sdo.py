@@ -259,10 +259,10 @@ class _Part(NamedTuple):
 
 
 class ColumnSdo:
-    """Decodes the SDO frames of a bus, block after block.
+    """Decoder of the SDO frames of a bus, block after block.
 
     Args:
-        bus: decodes single frames; other code may feed it between two blocks.
+        bus: decoder of single frames. Other code may use it between two blocks.
     """
 
     def __init__(self, bus: BusDecoder) -> None:

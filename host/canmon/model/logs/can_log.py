@@ -585,7 +585,7 @@ _MARKS: Final = "marks of gaps and triggers"
 
 
 class CanLogWriter:
-    """A log written by python-can.
+    """Writer of a log in a format that python-can supports.
 
     The formats number their buses. `can3` is number 3. Buses with other names get free numbers,
     which `words` lists.

@@ -378,7 +378,7 @@ class LogLines:
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
-        """Skip lines that hold frames by `holds_frame`, and that were read as columns.
+        """Skip lines that were read as columns. `holds_frame` is true for each of them.
 
         Args:
             lines: number of lines.

@@ -209,7 +209,7 @@ class BusNumbers:
         return self._numbers[channel]
 
     def messages(self, name: str) -> list[str]:
-        """Report the number of each bus whose name does not contain this number."""
+        """Report the number of each bus, unless its name is `can` and this number."""
         return [
             f"{name}: {channel} became can{number}"
             for channel, number in self._numbers.items()

@@ -81,7 +81,7 @@ DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingPlan:
-    """The settings of a recording. Without any setting, it is the single file `path`.
+    """The settings of a recording. Without any setting, the recording is the single file `path`.
 
     Attributes:
         path: path of the file, or base name of its parts.

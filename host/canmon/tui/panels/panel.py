@@ -46,7 +46,7 @@ _CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
-    """A list of lines, in which the chosen line is reversed.
+    """A list of lines. The chosen line is shown in reverse video.
 
     Attributes:
         chosen: number of the chosen line, from 0.
