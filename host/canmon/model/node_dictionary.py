@@ -97,7 +97,7 @@ class NodeDictionary:
         self._pdos: dict[str, tuple[int, Decoded]] = {}
 
     def take(self, at_us: int, decoded: Decoded) -> None:
-        """Take a decoded frame of this node."""
+        """Process a decoded frame of this node."""
         for transfer in decoded.transfers:
             self._transfer(at_us, transfer)
         if decoded.kind[:4] in _MAPPINGS:

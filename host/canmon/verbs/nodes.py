@@ -106,7 +106,7 @@ class _NodesView:
         self._watch = Stopwatch()
 
     def take_block(self, columns: Columns) -> None:
-        """Take a block of a log."""
+        """Process a block of a log."""
         if self._columns is None:
             self._columns = column_meanings.ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)

@@ -300,7 +300,7 @@ class _Reading:
         return self.source.failed
 
     def whole(self, make: Callable[[], _Seen]) -> _Seen:
-        """Read all of the source."""
+        """Read the whole source."""
         seen, log = make(), block_log(self._words, self._cut)
         if log is not None and _in_columns(seen.decoder):
             with closing(log):

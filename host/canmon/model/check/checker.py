@@ -365,7 +365,7 @@ class DecodedCheck:
         self._latest_us = 0
 
     def take(self, records: Sequence[Record]) -> list[TrafficFinding]:
-        """Return the violations in frames."""
+        """Check frames. Return the violations."""
         checker, decoder = self._checker, self._decoder
         if decoder is None:
             return [finding for record in records for finding in checker.take(record)]
@@ -392,7 +392,7 @@ class DecodedCheck:
     def end(
         self, end_us: int, lost: Iterable[str], judged_us: int, errors: Iterable[str]
     ) -> list[TrafficFinding]:
-        """Return missing frames, as `Checker.end` does."""
+        """Return findings about missing frames, as `Checker.end` does."""
         return self._around.flush(self._checker.end(end_us, lost, judged_us, errors))
 
     def unjudged(self, end_us: int, without_errors: str) -> Unjudged:
@@ -483,7 +483,7 @@ class Alarms:
         self.clear()
 
     def clear(self) -> None:
-        """Start again."""
+        """Delete all findings, and restart the rules."""
         self._checker = Checker(self.rules, self.bit_rate, self.data_bit_rate)
         self._alarms = {name: Alarm(name) for name in self.rules.names()}
         self.findings = deque(maxlen=KEPT)
@@ -523,7 +523,7 @@ class Alarms:
         return list(self._alarms.values())
 
     def broken(self, now_us: int) -> int:
-        """Count the rules that are broken now."""
+        """Return the number of rules that are broken now."""
         return sum(alarm.state(now_us) is AlarmState.BROKEN for alarm in self._alarms.values())
 
     def acknowledge(self) -> None:

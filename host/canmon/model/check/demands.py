@@ -181,7 +181,7 @@ class Never(RuleDemand):
         self._matches = event.matches
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Report the frame."""
+        """Report the frame as a violation."""
         self.judged = True
         return _said(decoded) if self._matches(record, decoded) else None
 
@@ -467,7 +467,7 @@ class FirstWithin(RuleDemand):
         self.due_us = at_us + self._most_us
 
     def pause(self) -> None:
-        """Wait no longer."""
+        """Stop waiting for frames."""
         self.due_us = NEVER
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
@@ -504,7 +504,7 @@ class _DeadlineDemand(RuleDemand):
         self._close_all()
 
     def pause(self) -> None:
-        """Wait no longer."""
+        """Stop waiting for frames."""
         self._close_all()
 
     def expire(self) -> Iterable[RuleBreach]:

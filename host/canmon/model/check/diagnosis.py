@@ -243,7 +243,7 @@ class Diagnoser:
         return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
 
     def summaries(self) -> list[learnt.BusSummary]:
-        """Return the usual traffic on each bus."""
+        """Return a summary of the traffic on each bus."""
         found = []
         for bus in self.kept:
             one = _BusJudge(bus, self._bit_rate, self._eds)

@@ -201,7 +201,7 @@ class BusEvents:
         self._untimed = times[0] == times[-1]
 
     def take(self, row: int) -> None:
-        """Take a frame of a service."""
+        """Process a service frame."""
         self._row = row
         frame, at_us = self._bus.frame(row), int(self._times[row])
         if isinstance(frame, ErrorFrame):

@@ -166,7 +166,7 @@ class TextTable:
         self._places = np.zeros(1 << bits, np.int32)
 
     def cells(self, numbers: npt.NDArray[np.int64]) -> Cells:
-        """Return the texts of some numbers."""
+        """Return the texts of these numbers."""
         places = self._places[numbers]
         if not places.all():
             new = np.unique(numbers[places == 0])

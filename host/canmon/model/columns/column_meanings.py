@@ -699,7 +699,7 @@ class ColumnNodes:
         self._decoder, self._board, self._begun = decoder, board, False
 
     def take(self, columns: Columns) -> None:
-        """Take a block of frames."""
+        """Process a block of frames."""
         if not len(columns):
             return
         if not self._begun:  # nodes with an EDS are on the bus of the very first frame

@@ -89,7 +89,7 @@ class _Objects:
         ]
 
     def select(self, rows: _Places) -> _Objects:
-        """Return some of the objects."""
+        """Return the objects at these positions."""
         whole = len(rows) == len(self.places)
         return self if whole else _Objects(self.data, self.places[rows])
 

@@ -67,7 +67,7 @@ class ColumnSurvey:
         self._blocks: dict[str, npt.NDArray[np.bool_]] = {}
 
     def take(self, columns: Columns) -> None:
-        """Take a block of frames."""
+        """Process a block of frames."""
         if not len(columns):
             return
         survey = self._survey

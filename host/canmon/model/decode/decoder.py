@@ -242,7 +242,7 @@ class BusDecoder:
         return tuple(self.named(transfer) for transfer in found if transfer)
 
     def memory(self, node: int) -> node_memory.NodeMemory:
-        """Return the knowledge about a node."""
+        """Return what is known about a node."""
         memory = self._memories.get(node)
         if memory is None:
             memory = self._memories[node] = node_memory.NodeMemory(self._eds.get(node))
@@ -524,7 +524,7 @@ class Decoder:
         return tuple(item for bus in self._buses.values() for item in bus.pending(now_us))
 
     def memory(self, channel: str, node: int) -> node_memory.NodeMemory:
-        """Return the knowledge about a node."""
+        """Return what is known about a node."""
         return self.bus(channel).memory(node)
 
     def bus(self, channel: str) -> BusDecoder:

@@ -358,7 +358,7 @@ class MissingSignals:
         return bool(self._left or self._words)
 
     def take(self, record: AnyRecord, decoded: Decoded) -> None:
-        """Take the decoded content of a frame."""
+        """Remove signals and words that a decoded frame contains."""
         if decoded.signals:
             left = self._left.items()
             self._left = {path: find for path, find in left if find(decoded) is None}

@@ -140,7 +140,7 @@ class _OpenTransfer:
             self.block_last = segment.seqno
 
     def take_block_segments(self, numbers: bytes, data: bytes, last: int | None) -> None:
-        """Keep many segments, as `take_block_segment` does one."""
+        """Keep many segments, as `take_block_segment` keeps one."""
         self._take_run()
         if not self._block and _SEQNOS.startswith(numbers):
             self._run = data

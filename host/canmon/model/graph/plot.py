@@ -792,7 +792,7 @@ class LiveGraph:
         del self.words[number]
 
     def take(self, record: Record, decoded: Decoded | None) -> None:
-        """Take the values in a frame."""
+        """Add the values in a frame."""
         self._collector.take_decoded(record, decoded)
 
     def clear(self) -> None:

@@ -517,7 +517,7 @@ class Collector:
         self._samplers = [wanted for wanted in self._samplers if wanted.series is not gone]
 
     def take(self, record: Record) -> None:
-        """Take the values in a frame."""
+        """Add the values in a frame."""
         wanted = (self._objects or self._samplers) and self._decoder
         self.take_decoded(record, wanted.take(record) if wanted else None)
 
@@ -551,7 +551,7 @@ class Collector:
         self._samplers.append(sampler)
 
     def take_all(self, records: Iterable[Record]) -> None:
-        """Take the values in frames."""
+        """Add the values in frames."""
         for record in records:
             if self.first_us is None:
                 self.first_us = record.at_us
