@@ -136,7 +136,7 @@ class FaultOrder:
     to_us: int = NEVER
 
     def begin(self, now_us: int) -> FaultSpec:
-        """Start the fault after its wait; return the fault with its end."""
+        """Store start and end of a fault whose wait is over; return the fault with its end."""
         self.due_us = max(now_us, self.spec.from_us)
         self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
         return replace(self.spec, to_us=self.to_us)
@@ -305,7 +305,7 @@ def _at(action: Callable[[], None], now_us: int) -> None:
 
 
 class Assembly(Copyable):
-    """The physical side of several devices.
+    """The physical inputs and outputs of several devices, as of one device.
 
     If there is only one device, its signals have their plain names. With several devices a signal
     has the name of its device as prefix: `left_drive/shaft_load_nm`.

@@ -28,7 +28,10 @@ _SWITCH_S: Final = 0.0005
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Shorten the switch interval, and freeze old objects, because collecting them takes 50 ms."""
+    """Prepare Python for real time: switch threads more often, and freeze old objects.
+
+    Frozen objects are not collected as garbage, which takes 50 ms.
+    """
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)
     gc.freeze()

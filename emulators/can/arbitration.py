@@ -36,7 +36,7 @@ def priority(frame: CanFrame) -> int:
 
 
 def dominant(frames: Sequence[CanFrame]) -> CanFrame:
-    """Return the frame that wins if the other senders give way."""
+    """Of frames with the same identifier, return the frame whose bits are dominant."""
     return min(frames, key=lambda frame: (frame.dlc, frame.data))
 
 
@@ -69,21 +69,21 @@ class CanArbiter(ArbiterFields):
         del self._ends[end.number - _FIRST_NUMBER]
 
     def put_back(self, ends: Iterable[CanEnd]) -> None:
-        """Let those nodes take part again that still have a frame to send."""
+        """Enter the nodes that still have a frame to send into the next arbitration."""
         for end in ends:
             if end.waiting:
                 self.push(end)
 
     @in_kernel
     def push(self, end: CanEnd) -> None:
-        """Let a node that has a frame to send take part again."""
+        """Enter a node that has a frame to send into the next arbitration."""
         frame = end.next
         rank = priority(frame) if frame[2] or frame[3] else frame[0] << _CAN_ID_PLACE
         head = rank << _NUMBER_BITS | end.number - _FIRST_NUMBER
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:
-        """Remove and return the winner; several nodes with the same identifier all win."""
+        """Remove and return the nodes that win: one node, or all with the same identifier."""
         heads = self.heads
         head = heappop(heads)
         winners = [self._ends[head & _NUMBER_MASK]]
@@ -92,7 +92,7 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Return the start, then the winner or winners among the nodes with the shortest wait."""
+        """Return the start of the next frame, and the winners among the nodes that are ready then."""
         waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]

@@ -21,7 +21,7 @@ class Filtering(Protocol):
 
     @property
     def accepts(self) -> Accepted:
-        """The accepted CAN-IDs, or None for all from power-on or a reset to the first tick."""
+        """The accepted CAN-IDs. None means all: from power-on or a reset to the first tick."""
         ...
 
     @property
@@ -39,14 +39,14 @@ class ErrorAware(Protocol):
     """A device that receives the error state of its CAN controller."""
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Accept a change, which takes effect in the next tick."""
+        """Accept a new error state, which takes effect in the next tick."""
 
 
 def is_filtering(device: object) -> TypeGuard[Filtering]:
-    """Return whether a device has the members of `Filtering`, by `__getattr__` too."""
+    """Return whether a device has the members of `Filtering`; `__getattr__` may provide them."""
     return all(hasattr(device, name) for name in ("accepts", "reconfigured_by", "on_accepts"))
 
 
 def is_error_aware(device: object) -> TypeGuard[ErrorAware]:
-    """Return whether a device has `bus_state`, by `__getattr__` too."""
+    """Return whether a device has `bus_state`; `__getattr__` may provide it."""
     return hasattr(device, "bus_state")

@@ -156,7 +156,7 @@ class CanFaults(Copyable):
         return self._tallies[key].acted if key in self._tallies else 0
 
     def judge(self, senders: Sequence[int]) -> FaultVerdict:
-        """Return the effect on the next frame of the senders; it stays the same until `spend`."""
+        """Return the effect of the faults on the senders' next frame; it is fixed until `spend`."""
         if self._planned is None:
             self.place = self.chance("place").draw()
         self._planned, self._hitting = senders, None

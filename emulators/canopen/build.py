@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A fully described node.
+    """A node with the description of its device.
 
     Attributes:
         name: prefix of the signals of the node, and key of its memory in a store file.

@@ -271,7 +271,10 @@ def _in_profile(
 
 
 def fitting(row: EntryDescription, value: int) -> Value:
-    """Return the value of an entry nearest to a number; -1 means all bits of an unsigned one."""
+    """Return the allowed value of an entry that is nearest to a number.
+
+    For an unsigned entry -1 means all bits set.
+    """
     low, high = row.low, row.high
     nearest: int | float = value
     if row.data_type.is_integer:

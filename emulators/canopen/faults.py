@@ -541,7 +541,7 @@ NODE_FAULTS: Final[Mapping[str, _NodeFaultType]] = {
 
 
 class NodeFaults(Copyable):
-    """The faults of one node, where an operator arms them by name.
+    """The faults of one node, which an operator arms by name.
 
     Args:
         node: the node.

@@ -46,11 +46,11 @@ NODE_OUTPUTS: Final = (
 
 
 class Node(Copyable):
-    """A `Device[Frames]` around a slave, with the physical side of its application.
+    """A CANopen slave as a `Device[Frames]`, with the inputs and outputs of its application.
 
     Without power the node neither sends nor receives, and it restarts when power returns. Changes
-    from the inside and reports of its CAN controller take effect at the start of its next tick. A
-    bus-off controller starts its recovery at once, as with most drivers.
+    of objects by name and reports of its CAN controller take effect at the start of its next tick.
+    A bus-off controller starts its recovery at once, as with most drivers.
 
     Not emulated: a change of the bit rate of the bus. LSS switches the bit rate of the node only.
 
@@ -277,7 +277,7 @@ class _NodePart(Protocol):
 
 
 class NodeSide:
-    """The physical side of a node, with all objects of its dictionary, or of a body.
+    """The inputs and outputs of a node, including all objects of its dictionary, or of a body.
 
     Args:
         part: the node, or the body.
@@ -291,7 +291,7 @@ class NodeSide:
 
 
 def side_of(nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> Assembly:
-    """Return the physical side of all nodes of a bus, and of bodies.
+    """Return the inputs and outputs of all nodes of a bus, and of bodies, as one object.
 
     If there is only one node, its signals have their plain names: `0x6000:1`, `state`. With several
     nodes the name of the node is a prefix: `5/0x6000:1`, `5/state`. The name of a body is a prefix
@@ -323,7 +323,7 @@ class _NodeInputs:
         self._signal(name).write(value)
 
     def check(self, name: str, value: Setting) -> Setting:
-        """Return the value, or raise ValueError as `set` would, if known in advance."""
+        """Return the value; raise ValueError as `set` would, as far as that is known in advance."""
         return self._signal(name).check(value)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:

@@ -73,7 +73,7 @@ _DeferredCall = Callable[[Callable[[], None]], None]
 
 
 class ObjectSignal:
-    """An object of the dictionary, set from the inside.
+    """An object of the dictionary, read and set inside the device, not over the bus.
 
     Access rights are ignored, except that a constant cannot be changed. The service that owns an
     object checks a new value and acts on it like on a value from the bus. So a heartbeat time that

@@ -102,7 +102,7 @@ _OF_FRAMES: Final = {
 
 
 def files(name: str, module: str, *, binary: bool = False) -> dict[str, str]:
-    """Return the texts of a package by path in its folder.
+    """Return the files of a new package: the text of each by its path in the folder.
 
     Args:
         name: name of the device for `tickrig emu`.

@@ -77,8 +77,8 @@ class Experiment:
             port names.
         omni: name and first pose of the robot on omni wheels, which has the next number.
         sticks: motions of each joystick, which are repeated.
-        driven: joysticks by name of the robot that each of them drives at first.
-        followed: leaders by name of the follower, at first.
+        driven: joysticks at the start, by name of the robot that each of them drives.
+        followed: leaders at the start, by name of the follower.
         acts: the changes. The last change ends the experiment.
         phase: phase of the common interface between joysticks and robots.
         controlled: robots that a joystick can be connected to. The default is all robots in
@@ -266,7 +266,7 @@ class ConvoyRun:
         }
 
     def begin(self) -> None:
-        """Print the head of the table, and the positions of the robots."""
+        """Print the header of the table, and the positions of the robots."""
         self._echo(f"  time s{''.join(f'{name:>16}' for name in self._experiment.names)}")
         self.look(0)
 

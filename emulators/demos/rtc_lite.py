@@ -40,7 +40,7 @@ _POWER_CUT: Final = "power_cut"
 
 
 class VirtualSetup:
-    """Serial lines in a rig; time passes as fast as it can be computed."""
+    """The nodes on serial lines in virtual time, which passes as fast as it can be computed."""
 
     def __init__(self) -> None:
         lines = {name: SerialLine(_BAUD) for name in NODES}

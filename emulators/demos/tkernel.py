@@ -51,7 +51,7 @@ class Estimate:
         self.y_m += dy_m
 
     def fix(self, x_m: float, y_m: float, level: int) -> None:
-        """Set the distance to a marker according to its signal level, in the believed direction."""
+        """Set the distance to a marker from its signal level; keep the estimated direction."""
         away_m = self.range_m * (1 - level / MAX_LEVEL)
         off_x, off_y = self.x_m - x_m, self.y_m - y_m
         if not (believed_m := hypot(off_x, off_y)):

@@ -131,7 +131,10 @@ class Tolerance:
         return any(fnmatchcase(text, pattern) for pattern in self.ignored)
 
     def kind(self, text: str) -> str:
-        """Return the kind of a line (text up to a colon, CAN-ID or pattern): order counts in it."""
+        """Return the kind of a line: its text up to a colon, its CAN-ID, or a pattern.
+
+        The order of lines is compared within a kind.
+        """
         for pattern in self.kinds:
             if fnmatchcase(text, pattern):
                 return pattern

@@ -189,7 +189,7 @@ class FrameSplitter(Copyable):
 
 
 class FrameLog:
-    """Splits one direction for a log, and returns the frames as text.
+    """Splits the traffic of one direction into frames, and returns them as text for a log.
 
     Args:
         rule: the rule with its descriptions.

@@ -545,7 +545,7 @@ class CandumpFile:
             _logger.warning("recording ended: %s; the emulator goes on", self.error)
 
     def close(self, now_us: int = 0) -> None:
-        """Close the file at a time without a line; closing it again has no effect."""
+        """Close the file; the time is not written. Closing it again has no effect."""
         try:
             self._file.close()
         except OSError as error:

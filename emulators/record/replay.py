@@ -378,7 +378,7 @@ def replay_device(
 
 
 def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
-    """Replay a recorded device on a new device; return the output with its ticks.
+    """Replay a recorded device on a new device; return its output, each with its tick.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -397,7 +397,7 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, _Traffic, int]]:
-    """Yield the traffic of one direction: time, all data of the tick, its first line."""
+    """Yield the traffic of one direction by tick: time, all data, first line in the trace."""
     together: list[Any] = []
     at_us = line = -1
     for record in [record for record in records if record.mark is mark]:

@@ -74,7 +74,7 @@ class WireLog:
         self._wake: Callable[[int], None] | None = None
 
     def follow(self, rig: Rig, name: str) -> None:
-        """End a frame as soon as a silence ends it, without waiting for the next traffic.
+        """Add a frame as soon as the silence that ends it is long enough, not at the next traffic.
 
         Args:
             rig: the rig with the time.

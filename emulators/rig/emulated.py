@@ -11,7 +11,7 @@ from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):
-    """Physical inputs of a device, by name; `InputBank` is one.
+    """Physical inputs of a device by name, such as an `InputBank`.
 
     Attributes:
         changed: whether an input was set since the device last checked.

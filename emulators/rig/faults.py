@@ -402,7 +402,7 @@ class FaultTally(Copyable):
         return _MOST if self.count is None else self.count - self.acted
 
     def allow(self, wanted: int = 1) -> int:
-        """Return how many of some actions are still allowed, and count them."""
+        """Return how many of `wanted` actions the limit still allows, and count these."""
         allowed = min(wanted, self.left)
         self.acted += allowed
         return allowed
@@ -465,7 +465,7 @@ class HoldingFault(ABC, Generic[W]):
         """Share common state with the fault of the other direction."""
 
     def end(self) -> None:
-        """Stop acting, but release held traffic at its time; called only for late faults."""
+        """Stop acting, but release held traffic at its time; called only if `is_late`."""
 
     def take_over(self, other: HoldingFault[W]) -> None:
         """Take over the held traffic of the fault that this fault replaces."""
@@ -566,7 +566,7 @@ class FaultyPort(Copyable, Generic[W]):
     def clear(self, name: str) -> None:
         """Clear a fault; do nothing if the fault is not armed.
 
-        Traffic that a late fault holds still arrives at its time, and no traffic overtakes it.
+        Traffic that a fault only delays still arrives at its time, and no traffic overtakes it.
         Traffic that another fault holds is lost.
         """
         for faults in (self._to_device, self._from_device):

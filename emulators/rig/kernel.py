@@ -115,7 +115,7 @@ if TYPE_CHECKING or _KERNEL is None:
         return False
 
     def enter_stations(timetable: object, stations: object, /) -> bool:
-        """Enter stations that became due earlier; return False if Python must enter them."""
+        """Enter stations that became due earlier in the timetable; return False if Python must."""
         return False
 
 else:

@@ -75,7 +75,7 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def arrival_us(self, count: int) -> int:
-        """Return the time when `count` bytes will have arrived, or the next check, or `NEVER`."""
+        """Return the time when `count` bytes will be here, or of the next check, or `NEVER`."""
         ...
 
     @property
@@ -89,15 +89,15 @@ class ByteEnd(Port[bytes], Protocol):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last sent byte will have passed (past or `NEVER` if it has)."""
+        """Time at which the last byte will have been sent; past or `NEVER` if it has been."""
         ...
 
     def unsent(self, now_us: int) -> int:
-        """Return how many bytes sent from here have not passed yet."""
+        """Return how many bytes of this end have not been sent completely yet."""
         ...
 
     def drop_unsent(self, now_us: int) -> None:
-        """Discard the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes of this end of which no bit has been sent yet."""
 
 
 class ByteLine(Protocol):
@@ -149,7 +149,7 @@ class OutsideBridge(Protocol):
         ...
 
     def take_in(self, now_us: int, /) -> None:
-        """Send the traffic of the outside on the wire."""
+        """Send the traffic that came from outside on the wire."""
 
     def give_out(self, now_us: int, /) -> None:
         """Deliver the arrived traffic to the outside."""

@@ -423,7 +423,7 @@ class Rig(Copyable):
             self._wires.advance(self.now_us)
 
     def run_to(self, t_us: int, host: Host | None = None, unseen_us: int = 0) -> None:
-        """Run all events up to and at a time, or until traffic has arrived at a host.
+        """Run all events up to a time, inclusive, or until traffic has arrived at a host.
 
         Args:
             t_us: time since the start of the rig.

@@ -87,7 +87,7 @@ class Looks(Copyable):
 
 
 class HostLimit(Copyable):
-    """The limit on the waits of hosts; this one is none, and a bench in virtual time has another.
+    """A limit on the waits of hosts; this class sets no limit, its subclass for benches does.
 
     Before a host advances the time, it calls `count` if `due_us` has passed.
 
@@ -98,7 +98,7 @@ class HostLimit(Copyable):
     due_us: int = NEVER
 
     def restart(self, now_us: int) -> None:
-        """Begin again, because the test itself has advanced the time."""
+        """Count waits from zero again, because the test itself has advanced the time."""
 
     def look(self, now_us: int) -> None:
         """Count a read of the clock."""
@@ -108,7 +108,7 @@ class HostLimit(Copyable):
 
         Args:
             now_us: the present time.
-            where: returns the line that waits; by default that of the calling host.
+            where: function that returns the line that waits. The default is the line of the host.
 
         Raises:
             AssertionError: the limit is reached.
@@ -124,7 +124,7 @@ class Passing(Protocol):
         ...
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Advance the time until `done()`; return False after the timeout."""
+        """Advance the time until `done()` is true; return False after the timeout."""
         ...
 
 

@@ -32,7 +32,7 @@ class WirePort(Protocol[W]):
 
 
 def is_wire_port(port: object) -> TypeGuard[WirePort[Any]]:
-    """Return whether a port has the members of `WirePort`, by `__getattr__` too."""
+    """Return whether a port has the members of `WirePort`; `__getattr__` may provide them."""
     return hasattr(port, "wire") and hasattr(port, "attach")
 
 
@@ -53,7 +53,7 @@ class Station(StationFields, Generic[W]):
         self._timetable: Timetable | None = None
 
     def stand_in(self, timetable: Timetable | None) -> None:
-        """Enter the station in a timetable on arrivals, or poll its port without a timetable."""
+        """Let arriving traffic enter the station in a timetable; without one, poll the port."""
         self._timetable = timetable
         if is_wire_port(self.port):
             self.port.attach(self.device, self._wake)
@@ -86,7 +86,7 @@ class _UartPort(Copyable, Generic[W]):
         return self._port.poll(now_us)  # type: ignore[no-any-return] # a Port
 
     def send(self, now_us: int, traffic: W, /) -> None:
-        """Send the traffic of a tick, then apply the setting after the tick."""
+        """Send the traffic of a tick, then apply the UART setting that the device has now."""
         self._port.send(now_us, traffic)
         self._follow(now_us)
 

@@ -45,7 +45,7 @@ _SHOWN: Final = {
 
 
 def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
-    """Return the function that makes the splitter of a direction."""
+    """Return a function that makes the frame splitter for one direction of the line."""
 
     def make(mark: Mark) -> Splitter:
         if config.framing is Framing.RTNO:

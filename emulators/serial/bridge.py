@@ -97,7 +97,7 @@ class Bridge:
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Send the data written outside since the last poll on the line.
+        """Send the data that hosts outside have written since the last poll on the line.
 
         The data may have been written at any time since the last poll. They count as written right
         after the last poll, so a host loses no tick by the polling.
@@ -157,7 +157,7 @@ class HostEnd:
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return the time when `count` bytes will have arrived, or the next check, or `NEVER`."""
+        """Return the time when `count` bytes will be here, or of the next check, or `NEVER`."""
         return self._end.arrival_us(count)
 
     @property
@@ -184,15 +184,15 @@ class HostEnd:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte of the host will have passed (past or `NEVER` if it has)."""
+        """Time at which the host's last byte will have been sent; past or `NEVER` if it has been."""
         return self._end.sent_us
 
     def unsent(self, now_us: int) -> int:
-        """Return how many bytes of the host have not passed yet."""
+        """Return how many bytes of the host have not been sent completely yet."""
         return self._end.unsent(now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Discard the bytes of the host of which no bit is on the line yet."""
+        """Discard the bytes of the host of which no bit has been sent yet."""
         self._end.drop_unsent(now_us)
 
     def poll(self, now_us: int, /) -> bytes:

@@ -38,7 +38,7 @@ class LineOutside(Port[bytes], Protocol):
         ...
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go without reading from them, while the line has no room."""
+        """Handle hosts that connect or leave, without reading from them: the line has no room."""
 
     def device_uses(self, setting: UartSetting, /) -> None:
         """Store the present setting of the device."""
@@ -175,7 +175,7 @@ class SerialHub(NonCopyable):
         return b"".join([port.poll(now_us) for port in self._ports])
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go, and send them buffered data."""
+        """Handle hosts that connect or leave, and send buffered data to hosts."""
         for port in self._ports:
             port.attend(now_us)
 

@@ -449,7 +449,7 @@ _log = logging.getLogger(__name__)
 
 
 class NetworkPort(NonCopyable):
-    """A `Port[bytes]` for hosts over TCP, which may come and go, one at a time.
+    """A `Port[bytes]` for hosts over TCP, which may connect and leave, one at a time.
 
     A second host is refused with a line of text, unless the present host has stopped sending, or
     has not read for 30 s. The port can decide this only after all data of the present host are on
@@ -524,7 +524,7 @@ class NetworkPort(NonCopyable):
             self._setting.want(str(setting))
 
     def poll(self, now_us: int, /) -> bytes:
-        """Return part of the host's data; let hosts come and go."""
+        """Return part of the host's data; accept and close connections."""
         data = self._host.poll(now_us) if self._host else b""
         self.spoken |= bool(data)
         if (setting := self._differing) is not None:

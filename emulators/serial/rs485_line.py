@@ -247,15 +247,15 @@ class Rs485End:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte sent from here will have passed (past if it has)."""
+        """Time at which the last byte of this end will have been sent; past if it has been."""
         return self._busy_us
 
     def unsent(self, now_us: int) -> int:
-        """Return how many bytes sent from here have not passed yet."""
+        """Return how many bytes of this end have not been sent completely yet."""
         return self._line.unsent(self._busy_us - now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Discard the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes of this end of which no bit has been sent yet."""
         self._busy_us = self._line.cut(self, now_us)
 
     @property

@@ -148,15 +148,15 @@ class LineEnd(Part):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last sent byte will have passed (past or `NEVER` if it has)."""
+        """Time at which the last byte will have been sent; past or `NEVER` if it has been."""
         return self._out.last_us
 
     def unsent(self, now_us: int) -> int:
-        """Return how many bytes sent from here have not passed yet."""
+        """Return how many bytes of this end have not been sent completely yet."""
         return self._out.unsent(now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Discard the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes of this end of which no bit has been sent yet."""
         self._out.drop_unsent(now_us)
 
     def poll(self, now_us: int, /) -> bytes:

@@ -113,7 +113,7 @@ class _InputReader:
         self._waits = (0, tick_us // 2, tick_us, tick_us, 2 * tick_us, 5 * tick_us, 20_000, 100_000)
 
     def acts(self, data: bytes) -> Iterator[FuzzAct]:
-        """Yield the acts; incomplete data at the end are ignored."""
+        """Yield the actions that bytes encode; incomplete data at the end are ignored."""
         rest = iter(data)
         try:
             for _ in range(_MOST_ACTS):
@@ -290,7 +290,7 @@ class DeviceFuzz:
             _check_words("answer", [answer], self._on_can)
 
     def acts(self, data: bytes) -> list[FuzzAct]:
-        """Return the acts that bytes encode.
+        """Return the actions that bytes encode.
 
         Args:
             data: any bytes.

@@ -10,7 +10,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 
 
 class Operated:
-    """An object without a wire, and actions on it, now or later.
+    """An object without a wire, with an operator who acts on it now or later.
 
     `EmulatorControl` answers requests about it.
 

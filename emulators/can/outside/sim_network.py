@@ -156,7 +156,7 @@ class SimNetwork(canopen.Network):
         self._rig.host_limit.restart(self.host.now_us)
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Advance the time until `done()`; return False after the timeout."""
+        """Advance the time until `done()` is true; return False after the timeout."""
         timeout_us = None if timeout_s is None else round(timeout_s * 1e6)
         return self._wait_until(done, None if timeout_us is None else self.host.now_us + timeout_us)
 
@@ -198,7 +198,7 @@ class SimNetwork(canopen.Network):
         return _SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
 
     def subscribe(self, can_id: int, callback: _Callback) -> None:
-        """Subscribe to a CAN-ID, and put the callback on the rig's clock."""
+        """Subscribe to a CAN-ID, and make the callback's object use the rig's clock."""
         self._adopt(getattr(callback, "__self__", None))
         super().subscribe(can_id, callback)
 

@@ -304,7 +304,7 @@ def complete(
 
 
 def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value]) -> Dictionary:
-    """Return a dictionary with other power-on values (or their bytes) of existing entries."""
+    """Return a dictionary in which existing entries have other power-on values."""
     rows: dict[int, EntryDescription] = {}
     for at, value in values.items():
         entry = dictionary.find(*at)

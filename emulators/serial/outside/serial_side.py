@@ -266,19 +266,19 @@ class HostTransmitter(Copyable):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte will have passed (past or `NEVER` if it has)."""
+        """Time at which the last byte will have been sent; `NEVER` while bytes are held."""
         if self.held:
             return NEVER
         sampled_us, line_us = -(-self._free_ps // PS_PER_US), self._end.sent_us
         return max(sampled_us, line_us) if line_us < NEVER else sampled_us
 
     def unsent(self, now_us: int) -> int:
-        """Return how many bytes have not passed yet."""
+        """Return how many bytes have not been sent completely yet."""
         begun = self._begun_ps > now_us * PS_PER_US
         return self._end.unsent(now_us) + len(self._waiting) + begun + len(self.held)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Discard the bytes of which no bit is on the line yet."""
+        """Discard the bytes of which no bit has been sent yet."""
         self._end.drop_unsent(now_us)
         self._waiting.clear()
         self.held.clear()

@@ -210,7 +210,7 @@ class BenchDevice:
         self._mode.perform(self.name, text, do)
 
     def observe(self, text: str, seen: tasks.Condition, within: Duration = SOON) -> bool:
-        """Check an observation at the device: in an emulator, or by a human operator.
+        """Return whether something is observed: by a function if emulated, or by a human operator.
 
         Args:
             text: description of the observation, such as `the motors drive forward at 30 %`. A
@@ -515,9 +515,9 @@ class Bench(BenchDevice, Closing):
 
         Raises:
             TypeError: the body awaits something else, such as `asyncio.sleep`.
-            RuntimeError: the condition of the body does not become true within a day of virtual
+            RuntimeError: an awaited condition does not become true within a day of virtual
                 time, or can never become true.
-            AssertionError: the body waits longer than the limit of the bench, in many waits.
+            AssertionError: the waits of the body together exceed the limit of the bench.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):
@@ -559,9 +559,10 @@ class Bench(BenchDevice, Closing):
         return nullcontext(time)
 
     def transcript(self) -> BenchTranscript:
-        """Return the latest lines, frames and actions, each with time, place, direction and text.
+        """Return the latest lines, frames and actions, each with time, wire, direction and text.
 
-        The latest 10,000 lines are kept. A line above them has the number of earlier lines.
+        The latest 10,000 lines are kept. If there were more, the first line of the text has the
+        number of earlier lines.
 
         Returns:
             The transcript as a text, which Jupyter shows line by line.

@@ -66,9 +66,9 @@ _ENDS: Final = (b"host", b"device")
 class Journal(WireLog):
     """The latest lines, frames and actions of all wires, in order of time.
 
-    A line has passed when the device receives or sends the end of the line. A serial line shows the
-    data that the host sent or received. Data that a fault has changed are shown as the device
-    receives or sends them, with the mark `~`.
+    A line of text is recorded when the device receives or sends its end. The bytes of a serial line
+    are those that the host sent or received. If a fault has changed data, a further entry with the
+    mark `~` shows them as sent and as received.
     """
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class Journal(WireLog):
     def of_line(
         self, source: str, splitter: Callable[[Mark], Splitter] | None
     ) -> Callable[[int, Mark, bytes], None]:
-        """Return a function that accepts bytes of a serial line, in any chunks."""
+        """Return a function that records bytes of a serial line, in any chunks."""
         log = WireLog(0) if splitter is None else WireLog(0, splitter)
         log.listeners.append(lambda line: self.add(line.at_us, line.mark, line.data, source))
         self._logs.append((source, log))
@@ -91,11 +91,11 @@ class Journal(WireLog):
         ends: tuple[bytes, bytes] = _ENDS,
         splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
-        """Return functions for the traffic as sent and as received.
+        """Return a function that records traffic as sent and as received, if a fault changed it.
 
         Args:
             source: name of the line or node.
-            ends: marks of the far and the near end.
+            ends: words for the far and the near end.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """
@@ -127,7 +127,7 @@ class Journal(WireLog):
         return hear
 
     def of_lost(self, source: str) -> Callable[[int, CanFrame], None]:
-        """Return a function for frames of a bus that no node receives."""
+        """Return a function that records frames of a bus that no node receives."""
 
         def hear(at_us: int, frame: CanFrame) -> None:
             self.add(at_us, Mark.WIRE, f"no node takes {frame}".encode(), source)
@@ -147,7 +147,7 @@ class Journal(WireLog):
         return hear
 
     def follow(self, rig: Rig, name: str = "") -> None:
-        """End frames as soon as a silence ends them."""
+        """Record a frame as soon as the silence that ends it is long enough."""
         for source, log in self._logs:
             log.follow(rig, source)
 
@@ -167,10 +167,10 @@ class Journal(WireLog):
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return the kept lines in order of time, with the frames that only a silence will end.
+        """Return the kept lines in order of time, and open frames that only a silence will end.
 
-        An action counts from the next tick of its device on. Therefore the action is added before
-        frames that end earlier.
+        The time of an action is the next tick of its device. Therefore an action may be added
+        before frames that end earlier.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
@@ -339,7 +339,7 @@ class RigState(Copyable):
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def draw_by(self, seed: int) -> None:
-        """Set another seed, different for each wire, for faults that start from now on."""
+        """Set new seeds, different for each wire, for the faults that start from now on."""
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 
@@ -366,7 +366,7 @@ class RigState(Copyable):
         return full
 
     def faults_of(self, owner: str) -> dict[str, str]:
-        """Return the full names of all faults of a device and its wire, or of a wire, or of all.
+        """Return the faults of a device and its wire, of a wire only, or of the whole bench.
 
         Args:
             owner: name of the device or wire, or empty for all.
@@ -575,7 +575,7 @@ class BenchRig(RunningEmulator):
 
     @property
     def settling_us(self) -> int:
-        """Time after which the data of hosts have arrived and each device has had two ticks."""
+        """Time until the bytes sent by hosts have arrived and each device has had two ticks."""
         now_us = self.rig.now_us
         lines = [one.line for one in self.state.mounts.values() if isinstance(one, LineMount)]
         sent_us = [line.b.sent_us for line in lines if line.b.sent_us < NEVER]

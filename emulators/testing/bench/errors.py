@@ -22,11 +22,11 @@ class NotOnThisBench(BenchError):  # noqa: N818 - no error of the test
 
 
 class BenchBlocked(BenchError):  # noqa: N818 - no error of the device
-    """A test without a verdict, for a reason outside the device."""
+    """A test comes to no verdict, for a reason outside the device."""
 
 
 class MachineTooSlow(BenchBlocked):
-    """Real time was not kept: delays of the device may come from the machine."""
+    """The machine was too slow for real time: delays may come from it, not from the device."""
 
 
 class PortGone(BenchBlocked):

@@ -91,7 +91,7 @@ def make_recorded(
 
 
 def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
-    """Return texts in devices of a trace that may be a `FILE.py:Class` of a user."""
+    """Return the texts in trace entries that may name Python code of a user: `FILE.py:Class`."""
     return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 

@@ -80,7 +80,7 @@ def check_condition(condition: object) -> None:
 
 
 def text_of(condition: Condition) -> str:
-    """Return a description of a condition: a line, or the place of the function."""
+    """Return a description of a condition: its line, or file and line number of its function."""
     if isinstance(condition, LineTrigger):
         return str(condition)
     code = getattr(condition, "__code__", None)
@@ -100,7 +100,7 @@ def _ordinal(number: int) -> str:
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
-    """Act once, between two ticks, as soon as a condition is true: now or after a later step."""
+    """Call `act` once, between two ticks, as soon as a condition is true: now or after a step."""
 
     def watch(now_us: int) -> None:
         if condition():
@@ -127,7 +127,7 @@ _WHAT_WAITS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """A wait of a body.
+    """A wait in an async body.
 
     Attributes:
         done: function that returns whether the condition is true.
@@ -163,7 +163,7 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
 
     Raises:
         TypeError: the body awaits something else, such as `asyncio.sleep`.
-        RuntimeError: the condition of the body does not become true within a day of virtual time,
+        RuntimeError: an awaited condition does not become true within a day of virtual time,
             or can never become true.
         HostHangsError: the limit for waits is reached.
         KeyboardInterrupt: the user has pressed Ctrl-C. The message has the condition and the

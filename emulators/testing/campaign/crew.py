@@ -157,7 +157,9 @@ _ATTEMPTS: Final = 3
 
 
 class Crew:
-    """Starts a worker if no worker is idle; several threads can use a crew.
+    """Worker processes that run tests; several threads can use a crew.
+
+    A crew starts a worker if no worker is idle.
 
     Args:
         order: the tests to collect.

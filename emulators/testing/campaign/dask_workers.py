@@ -67,7 +67,9 @@ class _CrewPlugin(WorkerPlugin):
 
 
 class DaskWorkers:
-    """All threads of a cluster; the batch of a lost worker goes to another worker.
+    """Runs tests on all threads of a Dask cluster.
+
+    The batch of a lost worker goes to another worker.
 
     Args:
         url: address of the scheduler.

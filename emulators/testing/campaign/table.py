@@ -230,7 +230,10 @@ def _seeds(rows: Sequence[CampaignRow]) -> str:
 
 
 def missing_seeds(table: CampaignTable) -> Iterator[str]:
-    """Report for each test the seeds between which runs are missing, as after a lost shard."""
+    """Yield a message for each test that lacks seeds between its first and its last seed.
+
+    Seeds are missing if the table of a shard is lost.
+    """
     tests: dict[str, list[int]] = {}
     for row in table.rows:
         tests.setdefault(row.test, []).append(row.seed)

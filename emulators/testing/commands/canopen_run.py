@@ -135,7 +135,7 @@ class _FrameTranscript(Transcript):
         super().__init__(emulator, write, lambda line: False)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send a frame; the log shows the frame when it has passed."""
+        """Send a frame of a host; the log shows the frame when the bus has carried it."""
         self._emulator.send(now_us, data)
 
 

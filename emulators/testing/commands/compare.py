@@ -269,7 +269,7 @@ class _Bus:
         self._said: list[Said] = []
 
     def play(self, records: Iterable[BenchRecord], end_us: int) -> list[Said]:
-        """Return the frames of the nodes up to a time, from the start of the recording."""
+        """Replay a recording up to a time, and return the frames that the nodes have sent."""
         for number, record in enumerate(records):
             at_us = max(0, self._begin_us + record.at_us)
             early = self._begin_us + record.at_us < 0

@@ -75,7 +75,7 @@ class _PortTap:
         self._line = b""
 
     def run(self, terminal: int | None) -> None:
-        """Pass bytes until `stop` is called or the port is gone.
+        """Forward bytes between host and device until `stop` is called or the port is gone.
 
         Args:
             terminal: descriptor of the operator's terminal, or None without a terminal.

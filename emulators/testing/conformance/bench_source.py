@@ -39,7 +39,7 @@ _INPUTS: Final = {0x6000: "di", _ANALOGUE: "ai"}
 
 
 class SlaveStimulus:
-    """Stimuli of a slave.
+    """Sets inputs of a slave, and reads its outputs, for the conformance tester.
 
     Args:
         slave: the slave, whose supply is switched elsewhere.
@@ -163,7 +163,9 @@ _Buses = dict[str, dict[str, CanopenSlave]]
 def bench_source(
     mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
 ) -> ConformSource:
-    """Return the source with the nodes of a bench; the nodes boot, which takes time on the bench.
+    """Return the nodes of a bench as a source for the conformance tester.
+
+    The nodes boot first, which takes time on the bench.
 
     Args:
         mode: the mode of the bench, in virtual time.

@@ -270,7 +270,7 @@ def level_of(word: str) -> Level:
 
 
 def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return separate groups and ids; raise ValueError if a group or id matches no check."""
+    """Split groups and ids of checks; raise ValueError if one of them matches no check."""
     names = patterns(only)
     for text in unknown(names):
         raise ValueError(f"only {text}")

@@ -24,7 +24,7 @@ _Entry = tuple[int, int, _Call]
 
 
 class DurandSlave:
-    """A `durand.Node`, called as by its own network and scheduler.
+    """A `durand.Node` as a slave; this object replaces the node's network and scheduler.
 
     durand has one scheduler for the whole process. The scheduler is replaced while the node is
     called, and then restored.

@@ -67,7 +67,7 @@ _MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
 
 
 def is_slave(node: object) -> TypeGuard[Slave]:
-    """Return whether a node has the members of a `Slave`, by `__getattr__` too."""
+    """Return whether a node has the members of a `Slave`; `__getattr__` may provide them."""
     return all(hasattr(node, name) for name in _MEMBERS)
 
 
@@ -90,7 +90,7 @@ class CalledSlave:
             each power-on.
 
     Raises:
-        ValueError: it does not make a callable.
+        ValueError: `make` does not return a callable.
     """
 
     tick_us: int = TICK_US
@@ -119,7 +119,7 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Return whether a node is the callable for each millisecond, not its factory."""
+    """Return whether a node is the function to call each millisecond, not one that makes it."""
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 
 
@@ -217,7 +217,7 @@ class Crashes:
 
 
 def guarded(stimulus: Stimulus) -> Stimulus:
-    """Make a check inconclusive if its stimuli raise unexpected exceptions."""
+    """Return a stimulus whose unexpected exceptions make a check inconclusive."""
 
     def act(*words: str) -> str:
         try:

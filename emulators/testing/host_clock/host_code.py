@@ -317,7 +317,7 @@ Acts = Mapping[tuple[Any, str], _Act]
 
 
 class Patches:
-    """Patches in place of functions, from `__enter__` to `__exit__`.
+    """Replaces functions by patches, from `__enter__` to `__exit__`.
 
     Patches are installed in modules and classes, and wherever a host's module has stored the
     function: by `from time import sleep`, as an attribute of a class, or as the default of an

@@ -200,7 +200,7 @@ class BenchEvidence(NamedTuple):
 
 
 class BenchWitness:
-    """Observes a bench from its beginning.
+    """Collects data of a bench for a report, from its beginning.
 
     Args:
         bench: the bench.

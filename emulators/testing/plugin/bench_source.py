@@ -88,7 +88,7 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return the request with the devices of this test, made and with complete paths.
+        """Return the request with the devices made for this test, and with complete paths.
 
         Raises:
             ValueError: there is no device, or another test has used the devices.

@@ -138,7 +138,7 @@ class _BenchedTest(TestWithBench):
         self._is_misused = True
 
     def close(self) -> None:
-        """Release all resources; a passed test fails if an error has occurred afterwards."""
+        """Release all resources; a passed test fails if an error has occurred after its body."""
         since = self.take_unheard() if self._passed else []
         with self._stack:
             if self.bench is not None:
@@ -255,7 +255,7 @@ def benched(
 
 @contextmanager
 def clocked(bench: Bench) -> Iterator[Any]:
-    """Run a test with the clock of its bench; a refusal that the host has caught fails the test."""
+    """Run a test with the clock of its bench; a host that waits where it cannot fails the test."""
     try:
         with bench.patched_time() as clock:
             yield clock

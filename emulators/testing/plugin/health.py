@@ -180,7 +180,7 @@ def _short(name: str, bench: Bench) -> str:
 
 
 def check_safe(bench: Bench, safe: SafeState) -> None:
-    """Raise ValueError if something is requested that the bench does not have."""
+    """Raise ValueError if a safe value is for an output that the bench does not have."""
     for name in safe if isinstance(safe, Mapping) and bench.mode != HARDWARE else ():
         bench.get(name)
 
@@ -209,10 +209,10 @@ THREADS: Final = "threads"
 
 @contextmanager
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
-    """Record the name, place and error of threads that start and die during the test.
+    """Record name, place and error of threads that start during the test and end with an error.
 
     For threads that started before the test, only pytest's warning appears, which covers all
-    threads. A thread that ends by `sys.exit()` counts as dead only if it passes an error.
+    threads. A thread that ends by `sys.exit()` is recorded only if its exit status is an error.
 
     Args:
         note: function that is called with a line, in the thread that dies.

@@ -187,7 +187,7 @@ def check_device(  # noqa: PLR0913 - by name
     remembers: bool = False,
     pauses: bool = True,
 ) -> None:
-    r"""Test a type of device in any session: bytes or frames, inputs, resets, pauses.
+    r"""Test a device type in random sessions of bytes or frames, inputs, resets and pauses.
 
     - The device has the attributes of a device, and returns values of the right types. `tick`
       clears `inputs.changed`.

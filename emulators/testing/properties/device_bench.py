@@ -203,7 +203,9 @@ def shorten(value: Any) -> str:
 
 
 def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Session) -> str:
-    """Return a text with the first difference of dense and sparse ticks, and with what was due.
+    """Return a text with the first difference of dense and sparse ticks, and with `due_us`.
+
+    With dense ticks a device is called at every tick, with sparse ticks only when it is due.
 
     Args:
         bench: function that makes a bench.

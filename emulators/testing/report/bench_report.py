@@ -78,7 +78,7 @@ class RunEnvironment:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A requirement that tests must show.
+    """A requirement that tests must show to be met.
 
     Attributes:
         name: name, as in the marker `req`, such as `SAF-12`.

@@ -216,7 +216,7 @@ class _TimelineEvent(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Everything in a test that belongs to a time.
+    """The faults, events and signals of a test on a time axis.
 
     Attributes:
         axis: the displayed span of time.

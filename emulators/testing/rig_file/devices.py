@@ -190,7 +190,7 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits | None:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return the kind of a type, and the type with a path that this program can open.
+    """Return which kind of device a `type` names, and the type with a path that can be opened.
 
     Args:
         text: type as in the file.
@@ -287,7 +287,7 @@ _TOLERANCE_TABLE = "tolerance"
 
 
 class DoorReader:
-    """Reads `[real]` and `[hardware]`.
+    """Reads the tables `[real]` and `[hardware]` of a rig file.
 
     Args:
         wires: wires by name. The value is None for a wire of unknown type.

@@ -128,8 +128,8 @@ class DevicePlan:
             None for `auto`.
         store: file for the data that a CANopen node stores by object 1010h and LSS.
         sdo: limits of the SDO servers of a CANopen node, or None for the default limits.
-        start: initial inputs by name, with the members of groups one by one. The value is a value,
-            or the signal that drives the input.
+        start: initial inputs by name, with the members of groups one by one. Each has a value, or
+            the signal that drives the input.
         made: the device, if the reader has made it and no bench uses it yet.
     """
 
@@ -188,7 +188,7 @@ class BusPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoorPlan:
-    """The place of a wire for hosts in real time.
+    """Where hosts find a wire in real time.
 
     Attributes:
         link: symbolic link to the pty of a line, or None for no link.
@@ -207,7 +207,7 @@ class RealPlan:
 
     Attributes:
         control: path of the control socket to serve.
-        doors: places by name of the wire. A wire without an entry has a pty.
+        doors: connections for hosts by name of the wire. A wire without an entry has a pty.
     """
 
     control: Path | None = None
@@ -257,7 +257,7 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwarePlan:
-    """The places of the real devices.
+    """The ports and buses of the real devices, and their operators.
 
     Attributes:
         control: control sockets of emulators that replace the operator, by name of the device. The
@@ -318,7 +318,7 @@ _WIRES: Final = {WireType.SERIAL: "serial line", WireType.RS485: "RS485", WireTy
 
 
 def summary(plan: RigPlan) -> Iterator[str]:
-    """Yield the counts of all parts, then lines for each wire with its devices and places.
+    """Yield lines of text: the counts of all parts, then each wire with its devices and addresses.
 
     Args:
         plan: content of the rig file.

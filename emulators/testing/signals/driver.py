@@ -71,7 +71,7 @@ class _SignalScope:
         self.signals, self.devices = signals, devices
 
     def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
-        """Return the object of a name: the name of a signal, a signal of a device, or None.
+        """Look up a name of a formula: return the name of a signal, or an input or output, or None.
 
         Args:
             name: name as in a formula: a signal, an input or output of the owner's device,
@@ -104,7 +104,7 @@ class _SignalScope:
                     yield found
 
     def ordered(self) -> list[str]:
-        """Return all signals, each after the signals that it needs; ValueError if impossible."""
+        """Return all signals, each after those that it needs; raise ValueError if impossible."""
         order: dict[str, None] = {}
         for key in self.signals:
             self._enter(key, (), order)
@@ -350,7 +350,7 @@ class _FilterNode(_RunningSignal):
         self.setting = self.spec.shaped(self._state)
 
     def observe(self, now_us: int) -> None:
-        """Store the value of the formula, which moves the signal."""
+        """Store the present value of the formula, for the next moves of the signal."""
         self._input = self.evaluate(self.filter.formula, now_us)
         if isnan(self._state) and isfinite(self._input):  # a lag that begins where its source is
             self._state = self._limited(self._input)

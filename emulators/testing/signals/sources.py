@@ -269,7 +269,7 @@ class Lag(Immutable):
         return -expm1(-every_us / self.tau_us)
 
     def moved(self, value: float, source: float, gain: float) -> float:
-        """Return the value of the lag after that time."""
+        """Return the value of the lag after the time for which `gain` was computed."""
         if abs(source - value) <= _SETTLED * max(abs(source), abs(value)):
             return source
         return value + (source - value) * gain

@@ -29,7 +29,7 @@ _LOG: Final = logging.getLogger(__name__)
 
 
 class HttpService:
-    """Serves a service in its own threads, as long as it is reachable.
+    """Serves a resolution service by HTTP, in its own threads, as long as it is reachable.
 
     Args:
         service: the service, whose `base` becomes the address of this server.

@@ -117,7 +117,7 @@ def _name_of(plan: BusPlan) -> str:
 
 
 def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
-    """Return a link to a bus, which does not receive its own frames.
+    """Return a link to a bus; the link does not receive the frames that it sends.
 
     Raises:
         BusGone: the bus cannot be opened.
@@ -128,7 +128,7 @@ def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
 
 
 def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
-    """Return a bridge from an end of an emulated bus to one of python-can.
+    """Connect an emulated bus with a python-can bus, and return the bridge.
 
     Args:
         end: end of the emulated bus.

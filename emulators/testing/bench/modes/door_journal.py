@@ -27,7 +27,7 @@ from tickrig.wire.can import CanFrame, Frames
 
 
 class PortRecord:
-    """Keeps traffic and actions, for `tickrig compare`; safe for several host threads.
+    """Records traffic and actions for `tickrig compare`; several host threads may use it at once.
 
     In the trace a serial line has the name of its first device, and a CAN bus has its own name. The
     trace has no actions on nodes, because a bus is compared by its frames.
@@ -91,7 +91,7 @@ def _wire_entry(mount: Mount) -> WireEntry:
 
 
 class DoorJournal(Journal):
-    """A journal of what hosts send and receive; hosts have threads.
+    """A journal of the traffic that hosts in several threads send and receive.
 
     Args:
         now_us: function that returns the time in microseconds.
@@ -108,7 +108,7 @@ class DoorJournal(Journal):
         self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
     def watch(self, mount: Mount, pace: HostPace) -> HostPace:
-        """Return a monitor for a connection of a wire.
+        """Return a monitor that records the traffic of a connection to a wire.
 
         Args:
             mount: wire of an equivalent emulated bench.
@@ -133,7 +133,7 @@ class DoorJournal(Journal):
         return super().lines()
 
     def look(self) -> None:
-        """Add frames that ended with a silence, because no rig adds them here."""
+        """Add frames that a silence has ended; with real devices no rig adds them."""
         with self._lock:
             self.end_silent(self._now_us())
 
@@ -165,7 +165,7 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Mark frames as known, or unmark them, at all other connections of a bus."""
+        """Mark frames as already recorded at all other connections of a bus, or unmark them."""
         with self._lock:
             self._announce(wire, watch, frames, by)
 
@@ -205,7 +205,7 @@ class _BusWatch(_Watch):
 
     @contextmanager
     def sending(self, frames: Frames) -> Iterator[None]:
-        """Mark frames at the other connections before these can receive the frames."""
+        """Mark frames as recorded at the other connections, before these can receive the frames."""
         self._journal.announce(self._wire, self, frames)
         try:
             yield

@@ -30,7 +30,9 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Monitor that measures how late the host of a connection was; subclasses get the traffic.
+    """Monitor of a host's connection: measures how late the host was.
+
+    Subclasses override `passed` to get the traffic.
 
     Attributes:
         late_us: largest delay up to now.
@@ -40,7 +42,7 @@ class HostPace:
         self._now_us, self.late_us = now_us, 0
 
     def used(self) -> None:
-        """Called before the host sends or waits; an exception forbids the call."""
+        """Called before the host sends or waits; an exception raised here prevents that."""
 
     def passed(self, mark: Mark, traffic: Any) -> None:
         """Called with bytes or frames that the host has sent or received."""
@@ -50,12 +52,12 @@ class HostPace:
         self.late_us = max(self.late_us, took_us - wanted_us)
 
     def sending(self, traffic: Any) -> AbstractContextManager[object]:
-        """Return a context for sending bytes or frames, which other connections may see."""
+        """Return a context manager for sending bytes or frames; other connections may see them."""
         return nullcontext()
 
     @contextmanager
     def waiting(self, wanted_us: int) -> Iterator[None]:
-        """Check the duration of the wait inside the block."""
+        """Measure the wait inside the block, and record it by `waited`."""
         begun_us = self._now_us()
         yield
         self.waited(wanted_us, self._now_us() - begun_us)
@@ -255,7 +257,7 @@ _LONG_US: Final = 20 * _LOOK_US
 
 
 class CpuWaits:
-    """The longest wait within a short time; 0 if the system does not count waits.
+    """Measures how long threads wait for a processor; 0 if the system does not count waits.
 
     A thread waits for a processor when it could run, but other threads run instead. The waiting
     time is the second number in `schedstat` of each thread (Linux,
@@ -275,7 +277,10 @@ class CpuWaits:
         self._seen_us, self._own = -_LOOK_US, ""
 
     def look(self, now_us: int) -> None:
-        """Check all threads, unless the last check is recent; old values are discarded."""
+        """Read the waits of all threads, unless the last check is recent.
+
+        If the last check is too old, the waits since then are ignored.
+        """
         passed_us, before = now_us - self._seen_us, self._waited_ns
         if passed_us < _LOOK_US:
             return

@@ -60,7 +60,9 @@ class LinePlace:
 
 
 class Doors:
-    """The `_HostDoors` of benches in real time. `close` also closes ports left open by hosts.
+    """Opens the wires of a bench in real time for hosts: as links, serial objects and buses.
+
+    `close` also closes ports left open by hosts.
 
     Args:
         places: addresses of the wires, by name.

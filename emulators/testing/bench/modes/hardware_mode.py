@@ -174,7 +174,7 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Return why failures are not valid, or "" if they are valid or a human answered no."""
+        """Return why a failed test is not valid, or "" if it is valid or a human answered no."""
         if self._operators.said_no:
             return ""
         host_us = max(self._pace.late_us, self._waits.worst_us)

@@ -147,11 +147,11 @@ class BenchMode(ABC):
         self._query(lambda rig: rig.journal.listeners.append(listener))
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Return an observation at a device; a human operator sees the text and answers."""
+        """Return whether something is observed: call `seen`, or show the text to a human."""
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Run an action at a device. The test runs `do`, or a human reads the text."""
+        """Run an action at a device: call `do`, or show the text to a human who does it."""
         do()
 
     def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
@@ -186,7 +186,7 @@ class BenchMode(ABC):
         return self._query(lambda rig: rig.journal.lines())
 
     def mappings(self) -> tuple[WireLine, ...]:
-        """Return frames before the journal that define the contents of PDOs."""
+        """Return earlier frames, no longer in the journal, that define the contents of PDOs."""
         return self._query(lambda rig: rig.journal.mappings())
 
     def unfinished(self) -> tuple[WireLine, ...]:
@@ -195,7 +195,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return why failures are not valid, or "" if real time was kept."""
+        """Return why a failed test is not valid, or "" if real time was kept."""
 
     def hung(self) -> str:
         """Return the error of a host that has waited endlessly; empty if there was none."""

@@ -566,11 +566,12 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return an action that makes a fault at a time of the bench.
+        """Return a function that starts a fault, called with the time of the bench.
 
         Args:
             owner: name of the device or wire, or empty for any.
-            order: the fault, which gets its full name. A fault with a condition must act at once.
+            order: the fault, whose name is replaced by its full name. If it has a condition, the
+                operator must be an emulator, because a human is too slow.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -609,7 +610,7 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Ask the human at a device, or the first human; return None if there is no human."""
+        """Return the answer of the human at a device, or of the first human; None without any."""
         for device in [owner] if owner else self._plan.devices:
             answer = self._operator_at(device).sees(text)
             if answer is not None:
@@ -618,7 +619,7 @@ class Operators:
         return None
 
     def have_done(self, owner: str, text: str) -> bool:
-        """Show a text to the human at a device, or the first human; return False without one."""
+        """Ask the human at a device, or the first human, for an action; False without a human."""
         for device in [owner] if owner else self._plan.devices:
             if self._operator_at(device).have_done(text):
                 self._journal.note(device, f"done: {text}")

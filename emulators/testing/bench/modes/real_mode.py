@@ -83,15 +83,15 @@ class _RigThread:
         """Wait until a condition is true, checked after each step.
 
         Args:
-            done: function that is called in this thread. An exception of the function is raised in
-                the thread of the caller.
+            done: function that is called in the thread of the rig. An exception of the function is
+                raised in the thread of the caller.
             until_us: time of the rig. The first step at or after this time is the last step.
 
         Returns:
             True if the condition is true, or False after the time-out.
 
         Raises:
-            BenchError: time does not pass, or the caller is in this thread.
+            BenchError: the time is stopped, or the caller is in the thread of the rig.
         """
         if self.here:
             raise BenchError("what is asked between two ticks cannot wait: no time passes there")
@@ -365,7 +365,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return why failures are not valid, or "" if real time was kept."""
+        """Return why a failed test is not valid, or "" if real time was kept."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us

@@ -104,17 +104,17 @@ class _WaitLimit(HostLimit):
         self.restart(now_us)
 
     def restart(self, now_us: int) -> None:
-        """Begin again, because the test itself has advanced the time."""
+        """Count waits from zero again, because the test itself has advanced the time."""
         self._looks = self._caught = 0
         self._parts = self._most_parts
         self.due_us = now_us + self._first_us if self.limit_us < NEVER else NEVER
 
     def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
-        """Count a part.
+        """Count a wait as one part of the limit.
 
         Args:
             now_us: the present time.
-            where: returns the line that waits; by default that of the calling host.
+            where: function that returns the line that waits. The default is the line of the host.
 
         Raises:
             HostHangsError: the limit is reached.
@@ -134,7 +134,7 @@ class _WaitLimit(HostLimit):
         """Count a read of the clock, or a wait that has taken no time.
 
         Raises:
-            HostHangsError: there were too many.
+            HostHangsError: there were too many such reads and waits.
         """
         self._looks += 1
         if self._looks > _MOST_LOOKS and self.limit_us < NEVER:
@@ -145,7 +145,7 @@ class _WaitLimit(HostLimit):
         """Count a request of the test.
 
         Raises:
-            HostHangsError: there were too many at one instant.
+            HostHangsError: there were too many requests at one instant.
         """
         if now_us != self._request_us:
             self._requests, self._request_us = 0, now_us
@@ -167,7 +167,7 @@ class _WaitLimit(HostLimit):
 
 
 class RigPassing:
-    """A `Passing` in the time of a rig.
+    """Advances the virtual time of a rig while a host waits, as a `Passing`.
 
     Callbacks in the middle of a step may read the clock, but not wait.
 
@@ -184,7 +184,7 @@ class RigPassing:
         return EPOCH_S + self._rig.now_us / 1e6
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Advance the time until `done()`; return False after the timeout.
+        """Advance the time until `done()` is true; return False after the timeout.
 
         Without a timeout, the method returns False when there are no more events, or after an hour.
 
@@ -220,12 +220,12 @@ class _Offers:
         self._open.append(offer)
 
     def close(self, left: int = 0) -> None:
-        """Withdraw the latest names, keeping a number of the first ones."""
+        """Withdraw all names except the first `left` names."""
         while len(self._open) > left:
             self._open.pop().__exit__(None, None, None)
 
     def way_back(self) -> Callable[[], None]:
-        """Return a function that withdraws names offered from now on."""
+        """Return a function that withdraws the names offered after this call."""
         return partial(self.close, len(self._open))
 
 
