@@ -61,7 +61,7 @@ def _any_name(name: str) -> None:
 def parse_fault_spec(
     text: str, check_name: Callable[[str], object] = _any_name, now_us: int = 0
 ) -> FaultSpec:
-    """Read a fault.
+    """Read the text of a fault.
 
     Args:
         text: text of a fault, such as `flip=0.001@5s-7s`, or `cut@+100ms-+2s` with times that count

@@ -92,7 +92,7 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Return the start of the next frame, and the winners among the nodes that are ready then."""
+        """Return the start of the next frame, and the winners among the nodes ready by then."""
         waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]

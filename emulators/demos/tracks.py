@@ -24,7 +24,7 @@ _NEVER: Final = Pose(nan, nan, nan)
 
 
 class RobotSample(NamedTuple):
-    """A robot at one time.
+    """Pose and command of a robot at one time.
 
     Attributes:
         time_s: time since the start, in s.

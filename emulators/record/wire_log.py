@@ -18,7 +18,7 @@ from tickrig.wire.lines import LineSplitter
 
 @dataclass(frozen=True, slots=True)
 class WireLine:
-    """A line on the wire.
+    """A line of text, or a frame, on a wire.
 
     Attributes:
         number: number of the line in the run, counted from 1.

@@ -87,7 +87,7 @@ class _Aboard(Coupling, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Cart:
-    """A cart.
+    """An emulated base with the components that drive it.
 
     Attributes:
         base: the emulated base.

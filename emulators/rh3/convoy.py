@@ -145,7 +145,7 @@ class _Robot:
 
 
 class Convoy:
-    """Robots in one map frame.
+    """Several robots with poses in one map frame.
 
     The first robot keeps its planner. The other robots follow the commands of the ports that are
     connected to them.

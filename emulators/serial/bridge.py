@@ -184,7 +184,7 @@ class HostEnd:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the host's last byte will have been sent; past or `NEVER` if it has been."""
+        """Time at which the last byte of the host will have been sent; past or `NEVER` if it is."""
         return self._end.sent_us
 
     def unsent(self, now_us: int) -> int:

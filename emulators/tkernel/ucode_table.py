@@ -44,7 +44,7 @@ _SECTIONS: Final[Schema] = {
 
 
 def parse_table(text: str) -> UcodeTable:
-    """Read a table.
+    """Read the text of a table of ucodes.
 
     Raises:
         ValueError: the table is invalid. The message is one line.

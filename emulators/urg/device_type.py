@@ -45,7 +45,7 @@ def _config_to_trace(parameters: UrgParameters, world: World) -> Config:
 
 
 def build_urg(config: Config) -> Urg:
-    """Build a sensor.
+    """Make an emulated range finder from its configuration.
 
     Raises:
         ValueError: a sensor does not have the setting, or does not accept the value.

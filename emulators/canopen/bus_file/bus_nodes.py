@@ -305,7 +305,7 @@ class _NodeMaker:
 
 @dataclass(frozen=True, slots=True)
 class BusNodes:
-    """The slaves of a bus.
+    """The CANopen slaves that a bus.yml describes.
 
     Attributes:
         nodes: slaves in the order of the file.

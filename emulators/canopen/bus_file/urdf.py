@@ -73,7 +73,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """The content of a file.
+    """The content of a URDF file.
 
     Attributes:
         name: name of the file.
@@ -85,7 +85,7 @@ class Urdf:
 
 
 def read_urdf(path: Path) -> Urdf:
-    """Read a file.
+    """Read a URDF file.
 
     Raises:
         OSError: the file cannot be read.
@@ -96,7 +96,7 @@ def read_urdf(path: Path) -> Urdf:
 
 
 def parse_urdf(data: bytes, name: str) -> Urdf:
-    """Read the bytes of a file; see `read_urdf`."""
+    """Read the bytes of a URDF file; see `read_urdf`."""
     if len(data) > _MOST_BYTES:
         raise BusMistakesError(
             [FileMistake(FilePlace(name, 1), f"more than {_MOST_BYTES:,} bytes: no URDF")]

@@ -221,7 +221,7 @@ def missing_of(lines: Sequence[WireLine]) -> str:
 
 
 class BenchOperator(Operator):
-    """The operator of several devices.
+    """Sets inputs and starts faults of several devices.
 
     Args:
         assembly: the devices on the physical side.
@@ -245,7 +245,7 @@ class BenchOperator(Operator):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The parts of a bench.
+    """The devices of a bench on their wires, with initial values and signals.
 
     Attributes:
         mounts: the devices on their wires.

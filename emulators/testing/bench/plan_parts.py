@@ -196,7 +196,7 @@ def rig_of(
     trace: Path | None = None,
     keeps: bool = True,
 ) -> BenchRig:
-    """Make a rig.
+    """Make the rig of a bench from its parts.
 
     Args:
         parts: the devices on their wires.

@@ -83,7 +83,7 @@ class Collected(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A test with a seed.
+    """A run of a test with a seed.
 
     Attributes:
         number: number of the run in the campaign.
@@ -97,7 +97,7 @@ class Run(NamedTuple):
 
 
 class RunVerdict(NamedTuple):
-    """Verdict of a run.
+    """Outcome of a run of a test, with the reason.
 
     Attributes:
         number: number of the run in the campaign.

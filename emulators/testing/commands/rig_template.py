@@ -43,7 +43,7 @@ class _TypeRefusedError(ValueError):
 
 
 def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
-    """Write a rig file.
+    """Return the text of a new rig file.
 
     Args:
         types: types of the devices, as in a rig file.
@@ -185,7 +185,7 @@ _STANDARD_OUTPUT: Final = "-"
 
 
 def init(types: tuple[str, ...], file: Path) -> None:
-    """Write the template to a file, or to standard output if the file is `-`."""
+    """Write a template of a rig file, to standard output if the file is `-`."""
     on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:

@@ -14,7 +14,7 @@ from tickrig.host.text.values import Setting
 
 
 class WorldInput(NamedTuple):
-    """An input that may change.
+    """An input of a device that a search may change.
 
     Attributes:
         name: name of the input.

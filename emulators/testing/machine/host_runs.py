@@ -240,7 +240,7 @@ _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssum
 
 @dataclass(frozen=True, slots=True)
 class HostFailure:
-    """A failure of a run.
+    """How and where a run of a `BenchMachine` failed.
 
     Attributes:
         error: exception of the run.

@@ -103,7 +103,7 @@ class WantedBench(NamedTuple):
         return self._replace(source=_placed(made, self.folder))
 
     def open(self) -> Bench:
-        """Make the bench.
+        """Make the bench that the test requests.
 
         Raises:
             ValueError: the configuration is not valid.

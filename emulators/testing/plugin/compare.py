@@ -94,7 +94,7 @@ _Reports = list[pytest.TestReport]
 
 
 class Compare:
-    """The plug-in of `--bench-compare`.
+    """The pytest plug-in of `--bench-compare`, which runs each test twice.
 
     Args:
         config: the configuration of pytest.

@@ -39,7 +39,7 @@ _Place = tuple[str, int, list[tuple[int, str]]]
 
 
 class ReportPlugin:
-    """The plug-in of `--bench-report`.
+    """The pytest plug-in of `--bench-report`, which writes a report of all tests.
 
     Args:
         config: the configuration of pytest.

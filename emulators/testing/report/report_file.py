@@ -91,7 +91,7 @@ def _values(value: Any) -> dict[str, Any]:
 
 
 def from_json(text: str) -> BenchReport:
-    """Read a report.
+    """Read a report from its JSON text.
 
     Raises:
         ReportError: the text is not JSON, not a report, a report of another version, or has an

@@ -21,7 +21,7 @@ _WIDE: Final = 25
 
 
 class TimeAxis(NamedTuple):
-    """The displayed span of time.
+    """The span of time that a report displays.
 
     Attributes:
         from_us: beginning of the span.
@@ -44,7 +44,7 @@ class TimeAxis(NamedTuple):
 
 
 class TimeSpan(NamedTuple):
-    """An event with a duration.
+    """A fault, or a value of a signal, drawn as a span on a time axis.
 
     Attributes:
         left: place of the beginning, in per cent.
@@ -80,7 +80,7 @@ _SWITCH: Final[tuple[float, float]] = (0, 1)
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """A signal on the axis.
+    """The curve or the words of one signal on a time axis.
 
     Attributes:
         name: name of the signal.

@@ -39,7 +39,7 @@ class WireType(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WirePlan:
-    """A wire.
+    """A serial line or CAN bus, as described in a rig file.
 
     Attributes:
         name: name for faults, connections and messages. A wire that the file omits has the name of
@@ -114,7 +114,7 @@ class MadeDevice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DevicePlan:
-    """A device.
+    """A device, as described in a rig file.
 
     Attributes:
         name: name of the device for tests and signals.
@@ -158,7 +158,7 @@ class DevicePlan:
 
 @dataclass(frozen=True, slots=True)
 class FaultPlan:
-    """A fault.
+    """A fault that a rig file schedules.
 
     Attributes:
         owner: name of the device or wire that has the fault.
@@ -171,7 +171,7 @@ class FaultPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BusPlan:
-    """A bus of python-can.
+    """A python-can bus, as described in a rig file.
 
     Attributes:
         interface: name of the driver.
@@ -203,7 +203,7 @@ class DoorPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealPlan:
-    """The bench in real time.
+    """The settings of a rig file for real time.
 
     Attributes:
         control: path of the control socket to serve.
@@ -287,7 +287,7 @@ class RigPlan:
         faults: faults in the order of the file.
         safe: safe values of outputs at the end of a test, for each device.
         body: body that drives move, or None if there is none.
-        real: the bench in real time.
+        real: settings for the bench in real time.
         hardware: bench of real devices, or None if the file has no such section.
         path: path of the file, for messages and relative paths, or None without a file.
     """

@@ -32,7 +32,7 @@ from tickrig.host.text.values import Setting
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """The properties of a device.
+    """The properties of a device, with which its table in a rig file is checked.
 
     Attributes:
         physical: inputs and outputs of the device.
@@ -81,7 +81,7 @@ class WrongDevice(NamedTuple):
 
 
 def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
-    """Make a device.
+    """Make a device of a rig file, and return its properties.
 
     Args:
         plan: plan of the device in the rig file.

@@ -59,7 +59,7 @@ _Term = _FormulaNumber | _Name | _Call
 
 @dataclass(frozen=True, slots=True)
 class Formula(Immutable):
-    """A formula.
+    """A formula that computes a value from signals and the time.
 
     Attributes:
         text: the formula as written.
@@ -167,7 +167,7 @@ _OPERATORS: Final[dict[type[ast.AST], str]] = {
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a formula.
+    """Read the text of a formula.
 
     Raises:
         ValueError: the text is not a formula, is too long, or has an unknown name or function.

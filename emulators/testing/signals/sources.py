@@ -196,7 +196,7 @@ class Noise(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class ValueTable(Immutable):
-    """Values at times.
+    """A value that follows a table of times and values.
 
     The first value also holds before its time, and the last value also holds after its time.
 
@@ -298,7 +298,7 @@ class Integral(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class SignalSpec(Immutable):
-    """A signal.
+    """The description of a signal: a value that may change with time.
 
     Attributes:
         source: source of the values.
@@ -342,7 +342,7 @@ Keys = tuple[str | int, ...]
 
 
 class SignalMistake(NamedTuple):
-    """A mistake in a signal.
+    """A mistake in the description of a signal.
 
     Attributes:
         keys: place of the mistake in the file.

@@ -24,7 +24,7 @@ def _config_to_trace(parameters: ReaderParameters, markers: Sequence[Marker]) ->
 
 
 def build_reader(config: Config) -> UcodeReader:
-    """Build a reader.
+    """Make an emulated ucode reader from its configuration.
 
     Raises:
         ValueError: a reader does not have the setting, or does not accept the value.

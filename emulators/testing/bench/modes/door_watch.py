@@ -132,7 +132,7 @@ class WatchedLink(Generic[W]):
 
 
 class WatchedFrameLink(WatchedLink[Frames]):
-    """A monitored `StampedLink`.
+    """A `StampedLink` to a CAN bus that reports its traffic and its waits.
 
     Args:
         link: the link that is monitored.
@@ -201,7 +201,7 @@ class WatchedPort(serial.SerialBase):
 
 
 def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> serial.SerialBase:
-    """Open a port.
+    """Open a serial port that reports its traffic and its waits.
 
     Args:
         url: URL of the port for `serial.serial_for_url`.

@@ -120,7 +120,7 @@ class Terminal:
         return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
-        """Ask for an action.
+        """Ask the human to do an action, and wait for the answer.
 
         Args:
             text: the action, as a sentence without its end.
