@@ -382,7 +382,7 @@ class _AssemblyInputs(Copyable):
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of several inputs that are set together."""
+        """Names of the inputs that are set together, by name of their group."""
         full = self._assembly.full_name
         return {
             full(name, group): tuple(full(name, member) for member in members)

@@ -127,8 +127,8 @@ class CanFaults(Copyable):
         Args:
             name: name of the fault.
             *arguments: texts after `NAME=`, split at commas.
-            number: number of the end of the only node whose frames the fault hits, for a fault of
-                `NARROWED`.
+            number: number of the bus end whose frames alone the fault hits, for a fault in
+                `NARROWED`, or None for all frames of the bus.
 
         Raises:
             KeyError: no fault has this name.

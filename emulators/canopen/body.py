@@ -153,7 +153,7 @@ class BodyOnDrives:
 
     @property
     def due_us(self) -> int:
-        """Time of the next action, which is a tick while the body slides without a drive."""
+        """Time of the next action: each tick while the body moves, or `NEVER` while it rests."""
         return NEVER if self.body.resting else 0
 
     def act(self, now_us: int, /) -> None:
@@ -202,7 +202,7 @@ class _Shaft:
         return self._forward * radians(float(self._application.read(self._angle)))
 
     def load(self, torque_nm: float, inertia_kg_m2: float) -> None:
-        """Apply a torque, positive forward, and an inertia."""
+        """Apply a torque (positive if forward) and an inertia to the shaft."""
         _set(self._bank, self._torque, self._forward * torque_nm)
         _set(self._bank, self._inertia, inertia_kg_m2)
 

@@ -26,7 +26,7 @@ class Inputs(Protocol):
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of several inputs that are set together."""
+        """Names of the inputs that are set together, by name of their group."""
         ...
 
     def __getitem__(self, name: str, /) -> Setting:

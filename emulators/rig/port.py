@@ -149,7 +149,7 @@ class OutsideBridge(Protocol):
         ...
 
     def take_in(self, now_us: int, /) -> None:
-        """Send the traffic that came from outside on the wire."""
+        """Send on the wire what came from outside."""
 
     def give_out(self, now_us: int, /) -> None:
         """Deliver the arrived traffic to the outside."""

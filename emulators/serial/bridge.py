@@ -97,7 +97,7 @@ class Bridge:
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Send the data that hosts outside have written since the last poll on the line.
+        """Send on the line what hosts outside have written since the last poll.
 
         The data may have been written at any time since the last poll. They count as written right
         after the last poll, so a host loses no tick by the polling.

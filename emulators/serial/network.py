@@ -498,7 +498,7 @@ class NetworkPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or the device's."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or as the device's."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:

@@ -179,9 +179,9 @@ class _PtyVisits(NonCopyable):
 class PtyPort(NonCopyable):
     """A `Port[bytes]` whose other side any serial program can open.
 
-    The emulator keeps the other side open too, so hosts may come and go. Data that no host has read
-    are kept, up to `buffer_bytes` here and about 4 KiB in the kernel. Beyond that, whole sends are
-    dropped and counted.
+    The emulator keeps the other side open too, so hosts may open and close it. Data that no host
+    has read are kept, up to `buffer_bytes` here and about 4 KiB in the kernel. Beyond that, whole
+    sends are dropped and counted.
 
     A second host that opens the terminal is not refused, because the kernel does not show this side
     which hosts have opened the terminal. TIOCEXCL would exclude the first host as well, but not a
@@ -231,7 +231,7 @@ class PtyPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or the device's."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or as the device's."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:

@@ -48,7 +48,7 @@ def build_urg(config: Config) -> Urg:
     """Make an emulated range finder from its configuration.
 
     Raises:
-        ValueError: a sensor does not have the setting, or does not accept the value.
+        ValueError: a setting is unknown, or its value is invalid.
     """
     defaults = {**_config_to_trace(UrgParameters(), World()), "scip": _OLD_SCIP}
     check_config(config, defaults, "a sensor has no setting", typed=False)

@@ -37,7 +37,7 @@ class CanBridge:
         return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
-        """Send the frames that came from outside since the last poll on the wire.
+        """Send on the wire the frames that came from outside since the last poll.
 
         The frames may have been sent at any time since the last poll. They count as sent right
         after the last poll, so a host loses no tick by the polling.

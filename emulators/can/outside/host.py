@@ -122,7 +122,7 @@ class CanHost:
 
         Args:
             timeout_us: longest wait; None for no limit.
-            more: whether this continues a wait with a timeout, which is counted once
+            more: whether this call continues a wait with a timeout. The whole wait counts once
                 (`HostLimit`).
 
         Raises:

@@ -55,8 +55,8 @@ class UrdfJoint:
         upper: upper limit of the position in rad or m, or None if unlimited.
         velocity: largest velocity in rad/s or m/s, or None if missing.
         effort: largest effort in Nm or N, or None if missing.
-        reduction: reduction of the actuator, or None if missing: number of turns of the actuator,
-            or rad per m, for each turn, or m, of the joint.
+        reduction: number of turns of the actuator for each turn of the joint, or rad of the
+            actuator for each m of a prismatic joint, or None if missing.
     """
 
     name: str

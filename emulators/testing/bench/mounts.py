@@ -93,7 +93,7 @@ class LineMount(Copyable):
         return WireEntry(WireType.SERIAL, {"baud": self.settings.baud})
 
     def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[bytes]]:
-        """Return the devices on the line, recorded if requested."""
+        """Yield the devices on the line; with a recorder they are recorded."""
         for (name, device), port in zip(self.devices.items(), self._ports, strict=True):
             yield Station(recorder.device(name, device) if recorder else device, port)
 
@@ -167,7 +167,7 @@ class BusMount(Copyable):
         return WireEntry(WireType.CAN, {"bit_rate": self.wire.bit_rate})
 
     def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[Frames]]:
-        """Return the nodes on the bus, recorded if requested."""
+        """Yield the nodes on the bus; with a recorder they are recorded."""
         for name, node in self.nodes.items():
             station = Station(recorder.device(name, node) if recorder else node, node.port)
             self.node_faults[name].station = station

@@ -18,7 +18,7 @@ _OPTIONS: Final = (
 
 
 class CampaignRefusal(Exception):  # noqa: N818 - what a campaign cannot do; nothing is broken
-    """A campaign cannot do something; the message is one line."""
+    """An operation of a campaign is impossible; the message is one line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -67,7 +67,10 @@ class _Worker:
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Disable output; pytest up to 9.0 needs a reporter to explain what `assert` compared."""
+        """Replace pytest's reporter by one without output.
+
+        pytest up to 9.0 needs a reporter to explain what `assert` compared.
+        """
         config.pluginmanager.unregister(name=_REPORTER)
         self._silent = pytest.TerminalReporter(config, open(os.devnull, "w"))  # noqa: SIM115
         config.pluginmanager.register(self._silent, _REPORTER)

@@ -410,7 +410,7 @@ class RunPage:
     def finish(
         self, *, virtual: bool, rows: Iterable[Sequence[str]], paths: Sequence[page.PagePath]
     ) -> None:
-        """Write the page.
+        """Write the page of the run.
 
         Args:
             virtual: whether the run was in virtual time.

@@ -83,7 +83,7 @@ class _NoFrames(Exception):  # noqa: N818 - what the slave has returned
 
 
 class CalledSlave:
-    """A slave from a callable, which is called each millisecond.
+    """A slave made from a function that is called each millisecond.
 
     Args:
         make: function that makes the callable, in its state after power-on. It is called again at

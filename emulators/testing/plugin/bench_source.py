@@ -251,7 +251,7 @@ def check_needs(needs: Iterable[str], bench: Bench) -> None:
     """Raise NotOnThisBench unless a bench has everything that a test needs.
 
     Raises:
-        ValueError: a name is misspelt; the test would be skipped on every bench.
+        ValueError: a name is misspelt, so that every bench would skip the test.
     """
     for need in needs:
         lacks = [_lack(choice, bench) for choice in need.split(_OR)]

@@ -33,9 +33,9 @@ LOST: Final = "lost"
 
 
 class Health:
-    """Watches a bench from its beginning.
+    """Records errors and lost data on the wires of a bench, from its beginning.
 
-    Errors or losses on a wire are intended if a fault of this wire, or of any device, occurred
+    Errors or losses on a wire are no problem if a fault of this wire, or of any device, occurred
     before. A line on which no host has sent anything may overflow, because no host reads the line.
 
     Args:
@@ -53,7 +53,7 @@ class Health:
             self._mode.act(self._begin)
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
-        """Return the problems, one per line, or "" if there are no problems.
+        """Return the problems, one text for each; empty if there are no problems.
 
         Args:
             allowed: permitted problems: `ERRORS`, `LOST`.

@@ -78,7 +78,7 @@ class WirePlan:
 
 
 class DeviceKind(Enum):
-    """Kind of object that the type of a device names."""
+    """What the `type` of a device in a rig file names."""
 
     SERIAL = "device type"
     MODEL = "CANopen model"

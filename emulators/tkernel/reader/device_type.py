@@ -27,7 +27,7 @@ def build_reader(config: Config) -> UcodeReader:
     """Make an emulated ucode reader from its configuration.
 
     Raises:
-        ValueError: a reader does not have the setting, or does not accept the value.
+        ValueError: a setting is unknown, or its value is invalid.
     """
     defaults = _config_to_trace(ReaderParameters(), ())
     check_config(config, defaults, "a reader has no setting", typed=False)

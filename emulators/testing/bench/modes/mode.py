@@ -217,7 +217,7 @@ POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
 
 
 class EmulatedMode(BenchMode):
-    """The part of a `BenchMode` that emulated devices in virtual and real time share."""
+    """Base class of the modes with emulated devices, in virtual and in real time."""
 
     @cached_property
     def _control(self) -> EmulatorControl:

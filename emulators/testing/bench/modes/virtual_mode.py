@@ -142,7 +142,7 @@ class _WaitLimit(HostLimit):
             self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
 
     def count_request(self, now_us: int) -> None:
-        """Count a request of the test.
+        """Count a request of the test, such as `get`.
 
         Raises:
             HostHangsError: there were too many requests at one instant.
