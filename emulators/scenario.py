@@ -283,7 +283,7 @@ class ScenarioPlayer:
             emulator.event_queue.put(self, end_us, self._end)
 
     def finish(self, now_us: int) -> None:
-        """Count the expectations that are still open as missed."""
+        """Count as missed the expectations that are not met yet."""
         for item in list(self._open):
             self._miss(item, now_us)
             self._emulator.event_queue.drop(item)

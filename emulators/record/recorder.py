@@ -115,7 +115,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of its UART, if it can change."""
+        """The UART setting of the device, if the setting can change."""
         return getattr(self._device, "uart", None)
 
     @property

@@ -148,7 +148,7 @@ class FaultForm(Immutable):
 
     @property
     def bare(self) -> list[str]:
-        """The names of its arguments that may be written without their names, in this order."""
+        """Names of the arguments whose values may be written alone, in this order."""
         own = [each.name for each in self.arguments if each.bare]
         return own or [_RATE] * self.rated
 

@@ -181,7 +181,7 @@ class Crew:
         return self._idle[-1].collected
 
     def do(self, runs: Sequence[Run], digest: str) -> list[RunVerdict]:
-        """Do runs one after the other.
+        """Execute runs one after the other, and return their verdicts.
 
         Args:
             runs: runs of collected tests.
@@ -267,7 +267,7 @@ class Crew:
 
 
 class LocalWorkers:
-    """Processes of this machine, each with a thread that waits for it.
+    """Runs tests in processes of this machine, each with a thread that waits for it.
 
     Args:
         crew: crew that has collected the tests.

@@ -415,7 +415,7 @@ _BIT_RATE: Final = 1_000_000
 
 
 def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
-    """Compare for a command line, and return the exit status."""
+    """Run `tickrig compare` on a trace, and return the exit status."""
     tolerance = _read_tolerance(options)
     try:
         recording = replay.read_bench_recording(file.read_bytes())

@@ -145,7 +145,7 @@ _FAILED: Final = 3
 
 
 def record_port(port: str, out: Path, type_name: str, link: Path | None, baud: int | None) -> int:
-    """Record for a command line, and return the exit status."""
+    """Run `tickrig record` on a serial port, and return the exit status."""
     usual_baud, inputs = _known(type_name)
     with ExitStack() as stack:
         stack.enter_context(warnings_shown())

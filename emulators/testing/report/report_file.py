@@ -148,7 +148,7 @@ class _Scanner:
         self._at += 1
 
     def value(self) -> Any:
-        """Return the next value, and skip it; raise ValueError if there is no value."""
+        """Return the next value, and move behind it; raise ValueError if there is no value."""
         while True:
             try:
                 found, end = self._scan(self._text, self._at)

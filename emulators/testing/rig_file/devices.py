@@ -56,7 +56,7 @@ _Wires = dict[str, plan.WirePlan | None]
 
 
 class DeviceReader:
-    """Reads the devices and puts them on wires.
+    """Reads the devices of a rig file and puts them on wires.
 
     Args:
         section: table `[device]`, or None if the file has no such table.
