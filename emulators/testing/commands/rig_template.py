@@ -185,7 +185,7 @@ _STANDARD_OUTPUT: Final = "-"
 
 
 def init(types: tuple[str, ...], file: Path) -> None:
-    """Write a template of a rig file, to standard output if the file is `-`."""
+    """Write the template of a rig file to a file, or to standard output if the file is `-`."""
     on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:
