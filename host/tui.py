@@ -73,20 +73,20 @@ _HEIGHT_BITS: Final = 6
 
 
 class LineView(ScrollView, can_focus=True):
-    """A view of lines, in which only changed lines are painted again.
+    """A scrollable view of text lines, which repaints only changed lines.
 
     If there are many lines, the view needs only the lines around the visible ones.
 
     Attributes:
         lines: lines that the view has.
-        begin: number of the first of these lines, counted from 0.
+        begin: number of the first line in `lines`, counted from 0.
         follows: whether the last line stays visible, because the user has not scrolled up.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
 
     class Moved(Message):
-        """Message that lines became visible that the view does not have."""
+        """A message: the user scrolled to lines that the view does not have."""
 
     def __init__(self, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -122,7 +122,7 @@ class LineView(ScrollView, can_focus=True):
 
         Args:
             lines: lines that the view gets.
-            begin: number of the first of these lines.
+            begin: number of the first line in `lines`.
             total: number of all lines. By default, it is the number of `lines`.
         """
         before, was = self.lines, self.begin
@@ -183,7 +183,7 @@ class LineView(ScrollView, can_focus=True):
 
 
 def rounded_up(total: int) -> int:
-    """Return a height that seldom changes while lines arrive, because a new layout takes long.
+    """Round a height up, so that it seldom changes while lines arrive. A new layout takes long.
 
     >>> rounded_up(50), rounded_up(1_001), rounded_up(100_000)
     (50, 1008, 100352)
@@ -193,7 +193,7 @@ def rounded_up(total: int) -> int:
 
 
 def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
-    """Return the strip of a line, from a given column on, padded to a given width."""
+    """Return the visible part of a line, from a column on, padded to a width."""
     if line_width(line) != len(line_text(line)):
         whole = Strip([Segment(in_cells(text), _style_on(base, style)) for text, style in line])
         return whole.crop(left, left + width).adjust_cell_length(width, base)
@@ -239,7 +239,7 @@ class Key(NamedTuple):
 
 
 def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
-    """Return the keys on lines of a given width, with a blank between two keys.
+    """Distribute the keys over lines of a given width, with a blank between two keys.
 
     All keys are shown in full.
     """
@@ -264,7 +264,7 @@ def key_at(row: Iterable[Key], column: int) -> Key | None:
 
 
 class KeyFooter(Widget):
-    """A footer with each key that is bound here and not hidden. A click presses the key.
+    """A footer that shows all bound keys that are not hidden. A click on a key presses it.
 
     The footer of Textual has one line, and cuts keys that do not fit.
     """
@@ -342,7 +342,7 @@ class _Harmless(LineFilter):
     """
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
-        """Return pieces with the same number of characters, all of which are visible."""
+        """Replace characters that are not printable. The number of characters stays the same."""
         return [
             piece
             if piece.control or piece.text.isprintable()
@@ -355,7 +355,7 @@ _HARMLESS: Final = _Harmless()
 
 
 class FramedApp(App[None]):
-    """A framed app, in which F1 shows and hides help, and Escape hides help.
+    """An app with a frame and help. F1 shows and hides the help, and Escape hides it.
 
     The keys q, Ctrl-Q and Ctrl-C, and signals, end the app.
 
@@ -377,7 +377,7 @@ class FramedApp(App[None]):
 
     @contextmanager
     def ended_by_signals(self) -> Iterator[None]:
-        """Make signals end only the app, so that the code after it in the block also runs."""
+        """Make signals in the block end only the app, so that the code after the app still runs."""
         with stopped_by_signals(self.end):
             yield
 
@@ -401,7 +401,7 @@ class FramedApp(App[None]):
         return type("FramedDriver", (_FramedDriver, driver), {})
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Return the filters that all painted text passes."""
+        """Return the filters that are applied to all painted text."""
         return [*super().get_line_filters(), _HARMLESS]
 
     def notify(self, message: str, **how: Any) -> None:

@@ -15,7 +15,7 @@ from tickrig.wire.errors import WireError
 
 @dataclass(frozen=True, slots=True)
 class UrgScan:
-    """The measurements of a sensor in one turn.
+    """The distances that a laser scanner measured in one turn.
 
     Attributes:
         time_ms: timer of the sensor at the start of the turn, 24 bits.
@@ -32,7 +32,7 @@ class UrgScan:
     specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
-        """Return the direction of a distance by its number, from straight ahead to the left."""
+        """Return the direction of a distance by its number: 0 is straight ahead, left is positive."""
         step = self.first + place * self.cluster + (self.cluster - 1) / 2
         return (step - self.specification.front) * tau / self.specification.resolution
 
@@ -52,11 +52,11 @@ _LEAVE_ADJUST: Final = "2"
 
 
 class UrgClient:
-    """A client that reads the type of the sensor, starts continuous measurement, and takes scans.
+    """A client of a laser scanner, which starts continuous measurement and receives scans.
 
-    The client first sends SCIP2.0, for a sensor in SCIP 1.1. It then sends TM2 and QT to stop a
-    measurement that an earlier host has started. If no valid scan arrives within the time of five
-    scans, the client starts again. A garbled scan is skipped.
+    The client first sends SCIP2.0, which switches a sensor from SCIP 1.1. It then sends TM2 and QT
+    to stop a measurement that an earlier host has started. If no valid scan arrives within the time
+    of five scans, the client starts again. A garbled scan is skipped.
 
     Args:
         link: line to the sensor.

@@ -38,7 +38,7 @@ _KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BusOptions:
-    """A bus, with its options on the command line."""
+    """The options of a command line that select a CAN bus."""
 
     interface: str | None = None
     channel: str | None = None
@@ -53,7 +53,7 @@ class BusOptions:
         return bool(self.interface or self.channel or self.timing or self.bus_kwargs)
 
     def arguments(self) -> list[str]:
-        """Return the equivalent words for another command line."""
+        """Return the options as words for another command line."""
         words = [f"--{name}={value}" for name in _PLAIN if (value := getattr(self, name))]
         for option, values in zip(GREEDY, (self.timing, self.bus_kwargs), strict=True):
             words += [option, *values] if values else []
@@ -90,18 +90,18 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
 
 
 class BusCommand(HarmlessCommand):
-    """A command whose `--timing` and `--bus-kwargs` accept all following words KEY=VALUE.
+    """A command in which `--timing` and `--bus-kwargs` accept several words KEY=VALUE.
 
     Do not use this class for a command whose own arguments have the form KEY=VALUE.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Repeat such an option before each of its values."""
+        """Parse the arguments, with such an option repeated before each of its values."""
         return super().parse_args(ctx, spread(args))
 
 
 def spread(args: Sequence[str]) -> list[str]:
-    """Repeat a greedy option before each KEY=VALUE that follows its first value.
+    """Insert an option again before each further KEY=VALUE, for options that accept several.
 
     >>> spread(["--bus-kwargs", "a=1", "b=2", "can0", "c=3"])
     ['--bus-kwargs', 'a=1', '--bus-kwargs', 'b=2', 'can0', 'c=3']
@@ -179,7 +179,7 @@ fd_options: Final[Decorator] = add_options(
 def bus_and_rest(
     words: Sequence[str], channel: str | None, rest: str, most: int | None = None
 ) -> tuple[str | None, list[str]]:
-    """Separate the BUS of a command from the words after it. With -c, there is no BUS.
+    """Separate the argument BUS of a command from the words after it. With -c, there is no BUS.
 
     Args:
         words: arguments of the command.

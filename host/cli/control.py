@@ -22,7 +22,7 @@ _NOBODY: Final = (FileNotFoundError, ConnectionRefusedError)
 
 
 def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
-    """Make one request and return its answer.
+    """Send one request to a control socket and return the answer.
 
     Args:
         socket: control socket of the server.
@@ -39,7 +39,7 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
 
 @contextmanager
 def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
-    """Raise Refused in place of errors of a `ControlClient`. `request` describes the arguments."""
+    """Turn errors of a `ControlClient` into Refused. The arguments are those of `request`."""
     try:
         yield
     except TimeoutError:

@@ -28,7 +28,7 @@ _PORT: Final = 2809
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """Address of an ORB for listening and for peers, or of a name server.
+    """Address of a name server, or the address at which an ORB listens and peers connect.
 
     CORBA has no access control. Anyone who can connect to the address can do everything that
     rtshell can do.
@@ -82,7 +82,7 @@ def _parse_openrtm(name_server: str, address: str = "", names: str = "") -> Open
 
 
 def format_name(pattern: str, values: Mapping[str, str]) -> str:
-    """Make the path of a component from one of OpenRTM's `naming.formats`.
+    """Make the name-server path of a component from a format of OpenRTM's `naming.formats`.
 
     Args:
         pattern: format such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
@@ -183,11 +183,11 @@ class EngineOptions:
 
 
 def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
-    """Remove the options of engines from the options of a command.
+    """Move the options of engines out of the options of a command, and return their settings.
 
     Args:
         options: options of the command line by name.
-        topics: default table of topics. If it is empty, all ports have a topic.
+        topics: text of the default table of topics. If it is empty, all ports have a topic.
 
     Raises:
         Refused: an option belongs to an engine that is not requested, or is invalid.

@@ -16,12 +16,12 @@ T = TypeVar("T")
 
 
 class ExtensionError(ValueError):
-    """A missing or unusable extension. The message is one line."""
+    """An extension is missing or unusable. The message is one line."""
 
 
 @dataclass(frozen=True)
 class ExtensionGroup(Generic[T]):
-    """One entry-point group, with built-in members and members of other packages.
+    """One group of entry points, with built-in members and members of other packages.
 
     No module is imported, and no metadata is read, before the first access. Built-in members need
     no installation. An entry point with the name of a built-in member does not replace that member.
@@ -66,7 +66,11 @@ class ExtensionGroup(Generic[T]):
         return {name: self.load(name) for name in self.built_in} | self.load_foreign(notify)
 
     def load_foreign(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Return the members of other packages as `load_all` does."""
+        """Return the members of other packages by name.
+
+        Members that cannot be loaded are omitted and reported.
+
+        """
         members = dict[str, T]()
         for point in self._foreign():
             try:

@@ -22,20 +22,20 @@ NEEDS_YAML: Final = "a System Definition needs PyYAML: pip install 'tickrig[rtc]
 
 
 class Refused(click.ClickException):
-    """A refusal, printed as one line on standard error, with exit status 2."""
+    """The command refuses its input: one line on standard error, and exit status 2."""
 
     exit_code = 2
 
 
 class SourceFailed(click.ClickException):
-    """A failure of a bus, a file or a disk: one line on standard error, and exit status 3."""
+    """A bus, a file or a disk failed: one line on standard error, and exit status 3."""
 
     exit_code = 3
 
 
 @contextmanager
 def refused_at(option: str) -> Iterator[None]:
-    """Raise Refused, with the name of the option, in place of a ValueError."""
+    """Turn a ValueError of the block into Refused, with the name of the option."""
     try:
         yield
     except ValueError as error:
@@ -44,7 +44,7 @@ def refused_at(option: str) -> Iterator[None]:
 
 @contextmanager
 def failing(*errors: type[Exception]) -> Iterator[None]:
-    """Raise ClickException (exit status 1) in place of these errors.
+    """Turn these errors of the block into ClickException (exit status 1).
 
     For an error whose `status` is 3, raise SourceFailed instead. `status` is the exit status of a
     process that this command started. An error of standard output is not changed.
@@ -66,7 +66,7 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 
 @contextmanager
 def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[None]:
-    """Raise Refused in place of an error of the block. An OSError is handled as in `refuse_path`.
+    """Turn an error of the block into Refused. An OSError is handled as in `refuse_path`.
 
     Args:
         what: invalid option or argument, which starts the message.
@@ -126,7 +126,7 @@ def show_findings(findings: Iterable[Finding]) -> None:
 
 @contextmanager
 def until_unread() -> Iterator[None]:
-    """End the block quietly when standard output is closed, as before `| head`.
+    """End the block without a message if the reader of standard output has ended, as in `| head`.
 
     Raises:
         SourceFailed: standard output cannot be written, for example because the disk is full.

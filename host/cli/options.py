@@ -60,7 +60,7 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 def refuse_idle(why: str, *names: str) -> None:
-    """Raise Refused for options that the user gave to the current command but that have no effect.
+    """Refuse the current command if the user gave options that have no effect.
 
     Args:
         why: reason why the options have no effect, such as `--jsonl has its own times`.
@@ -153,7 +153,7 @@ run_code_option: Final[Decorator] = click.option(
 
 
 def works_in(path: str) -> Decorator:
-    """Return a decorator for a function that declares the options of a command.
+    """Return a decorator for a function that only declares the options of a command.
 
     The function at `path` does the work of the command. Help and completion need only the options,
     so the module of this function is imported only when the command runs. The decorated function
@@ -193,7 +193,7 @@ class LazyCommand(click.Command):
 
 
 class LazyGroup(HarmlessCommand, click.Group):
-    """A group whose commands are in separate modules.
+    """A group of commands, each imported from its own module only when it is needed.
 
     Args:
         commands: path and short help of each command by name, in the order of the list.

@@ -160,7 +160,7 @@ class _HarmlessStream(io.TextIOWrapper):
 
 
 def paint(stream: TextIO, text: str) -> None:
-    """Write a screen that a command draws, or output for programs.
+    """Write text unchanged: a screen drawn by a command, or output for programs.
 
     The text is written at once, and no characters are replaced.
     """
@@ -181,14 +181,14 @@ def write_harmless(stream: TextIO, text: str) -> None:
 
 
 def as_is(stream: TextIO) -> TextIO:
-    """Return the stream that writes what a command paints itself."""
+    """Return a stream that writes text unchanged, without replacing control characters."""
     stream.flush()
     return stream.as_is if isinstance(stream, _HarmlessStream) else stream
 
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Provide all three standard streams during the block, with control characters replaced.
+    """Provide the three standard streams in the block, and replace control characters in output.
 
     If standard error is a file on a full disk, the command continues. The messages are dropped, and
     the exit status does not change.
@@ -214,7 +214,7 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise an error of standard output again, whatever text was printed.
+    """Raise the error again if it is a write error of standard output.
 
     If the reader has closed the pipe, as before `| head`, the command ends without a message.
     """
@@ -232,7 +232,7 @@ def load(path: str) -> Any:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Make Ctrl-C end the process at once, while there is nothing to clean up.
+    """Make Ctrl-C end the process at once during the block, when there is nothing to clean up.
 
     Other handlers of Ctrl-C are kept. Threads are not affected.
     """
@@ -274,7 +274,7 @@ class Interrupter:
 
     @contextmanager
     def repeating(self) -> Iterator[None]:
-        """Repeat signals whose exception Python can only report, such as one in a `__del__`."""
+        """Repeat a signal whose exception Python ignores, for example in a `__del__`."""
         before = sys.unraisablehook
 
         def unraisable(lost: sys.UnraisableHookArgs, /) -> None:
@@ -312,7 +312,7 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 @contextmanager
 def taking_signals(received: _Handler) -> Iterator[None]:
-    """Call `received` at Ctrl-C, SIGTERM and SIGHUP.
+    """Make Ctrl-C, SIGTERM and SIGHUP call `received`.
 
     SIGINT is handled even if it was ignored at the start, because the shell of a script ignores it
     for commands before `&`. SIGHUP stays ignored if it was ignored at the start, because nohup

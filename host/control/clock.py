@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 class RealClock:
-    """The monotonic clock of this machine, which starts with the first wait."""
+    """This machine's monotonic clock, counted from the first wait."""
 
     def __init__(self) -> None:
         self._start_ns: int | None = None
@@ -26,7 +26,7 @@ class RealClock:
             t_us: time since the first wait.
 
         Returns:
-            The delay of the end of the wait in us.
+            The time in us by which the wait ended too late.
         """
         if self._start_ns is None:
             self._start_ns = time.monotonic_ns()
@@ -38,7 +38,7 @@ class RealClock:
 
 
 class ServingClock(RealClock):
-    """The monotonic clock of this machine, which serves requests while it waits.
+    """This machine's monotonic clock, which calls a server of requests while it waits.
 
     Attributes:
         serve: function that is called with the time in microseconds that it may take. It is called

@@ -20,10 +20,10 @@ _NOT_JSON: Final = "the line is not a JSON object"
 
 
 class RequestDispatcher:
-    """A dispatcher that answers requests by a table of verbs. An invalid request changes nothing.
+    """A dispatcher that calls the function for a request. An invalid request changes nothing.
 
     Args:
-        verbs: verbs by the value of `do` in a request. A verb raises ValueError to refuse.
+        verbs: functions by the value of `do` in a request. A function raises ValueError to refuse.
     """
 
     def __init__(self, verbs: Mapping[str, _Verb]) -> None:
@@ -43,7 +43,7 @@ class RequestDispatcher:
             return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
-        """Return the answer to a request: `ok`, and the result or `error`."""
+        """Return the answer to a request, with the field `ok` and either the result or `error`."""
         head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
@@ -72,12 +72,12 @@ def _refusal(error: str) -> Object:
 
 
 def refusal_line(error: str) -> bytes:
-    """Return the answer to a refused request as a line."""
+    """Return the line that answers a refused request."""
     return _encode(_refusal(error))
 
 
 def text_of(request: Mapping[str, object], key: str) -> str:
-    """Return a string field. Raise ValueError if it is not a string."""
+    """Return a field of a request. Raise ValueError if it is not a string."""
     value = request.get(key)
     if not isinstance(value, str):
         raise ValueError(f"{key} is a string, not {short(value)}")

@@ -65,7 +65,7 @@ class _Readable(Protocol):
 
 
 class LineServer:
-    """A server for a listening socket, which works whenever `serve` is called.
+    """A server for a listening socket. It works only during calls of `serve`.
 
     In each round the server answers at most one line of each client. It stops reading requests of a
     client that does not read its answers.
@@ -92,7 +92,7 @@ class LineServer:
         self._attached: dict[_Readable, Callable[[], None]] = {}
 
     def attach(self, source: _Readable, ready: Callable[[], None]) -> None:
-        """Serve another source in addition.
+        """Also watch another source for data to read.
 
         Args:
             source: object with a descriptor, which is -1 after closing.
@@ -101,7 +101,7 @@ class LineServer:
         self._attached[source] = ready
 
     def serve(self, wait_us: int) -> None:
-        """Run one round. Wait for work at most `wait_us`."""
+        """Serve the clients once, after a wait of at most `wait_us` for work."""
         clients = self._clients.values()
         readers = [client.connection for client in clients if client.wants_more]
         writers = [client.connection for client in clients if client.has_unsent]
@@ -245,7 +245,7 @@ class _Client:
 
 
 class ControlServer(LineServer):
-    """A server for a control socket, which works whenever `serve` is called.
+    """A server for a control socket. It works only during calls of `serve`.
 
     Args:
         path: path of the socket. A socket left by a killed process is replaced.

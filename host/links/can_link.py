@@ -47,7 +47,7 @@ _NO_MSGPACK: Final = "msgpack not installed"
 
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
-    """Return a message. The timestamp of the message is in seconds, as in python-can."""
+    """Convert a frame to a python-can message, whose time stamp is in seconds."""
     if isinstance(frame, FdFrame):
         return _fd_message(frame, at_us)
     return can.Message(
@@ -74,7 +74,7 @@ def _fd_message(frame: FdFrame, at_us: int) -> can.Message:
 
 
 def to_frame(message: can.Message) -> CanFrame | None:
-    """Return a frame, or None for an error frame and for CAN FD."""
+    """Convert a python-can message to a CAN frame. Return None for an error frame or CAN FD."""
     if message.is_error_frame or message.is_fd:
         return None
     remote = message.is_remote_frame
@@ -88,7 +88,7 @@ def to_frame(message: can.Message) -> CanFrame | None:
 
 
 def to_fd_frame(message: can.Message) -> FdFrame | None:
-    """Return a CAN FD frame, not validated, or None for any other message.
+    """Convert a message to a CAN FD frame without validation. Return None for other messages.
 
     In an ASC log, python-can reads a CAN FD frame without data as a remote frame, but CAN FD has no
     remote frames.
@@ -100,7 +100,7 @@ def to_fd_frame(message: can.Message) -> FdFrame | None:
 
 
 def to_error_frame(message: can.Message) -> ErrorFrame | None:
-    """Return an error frame, or None for any other message."""
+    """Convert a message to an error frame. Return None for other messages."""
     if not message.is_error_frame:
         return None
     data = bytes(message.data)[:8].ljust(8, b"\0")
@@ -112,14 +112,14 @@ _DRIFT: Final = 5_000
 
 
 class StampClock:
-    """A clock that computes the arrival of a frame from the time stamp of the driver.
+    """A clock that computes the arrival time of a frame from the driver's time stamp.
 
     The driver's clock starts at an unknown time (1970, or power-on), and it drifts. A frame is read
     after its arrival. Therefore the smallest difference seen between reading time and time stamp is
     taken as the offset of the two clocks.
 
-    A frame that was missing at the last poll has arrived since that poll. Therefore wrong time
-    stamps, and a driver's clock that is set to another time, matter only while the host is late.
+    A frame cannot have arrived before the last poll that found no frame. Therefore wrong time
+    stamps, or a jump of the driver's clock, cause wrong times only while the host is late.
 
     >>> clock = StampClock()
     >>> clock.at_us(7.0, 0, 100), clock.at_us(7.3, 100, 900_000)  # stopped for 0.9 s
@@ -202,7 +202,7 @@ def _enlarge_queue(sock: socket.socket) -> None:
 
 
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
-    """Enlarge the queue of a bus, and limit the bus to its own multicast group.
+    """Prepare a python-can bus: enlarge its queue, and receive only its own multicast group.
 
     python-can binds the socket of `udp_multicast` only to a port. Linux then delivers data on that
     port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
@@ -263,7 +263,8 @@ class BusReceiver:
         bus: open bus without other readers.
         name: name of the bus for messages.
         ends: error codes. An OSError or CanError with one of these codes ends the reading at once.
-        gone: function that makes the exception that is raised at the end, from a text.
+        gone: function that makes the exception to raise when reading ends. Its argument is the
+        message.
         raises: errors that are re-raised.
         read: function that reads the bus. By default, it is `recv` of the bus.
 
@@ -376,7 +377,7 @@ def _odd(message: can.Message) -> str:
 
 
 def reason_of(error: Exception) -> str:
-    """Return the exception of a driver in one line, with its type if it is not a bus error."""
+    """Describe a driver's exception in one line, with its type if it is not a bus error."""
     text, kind = first_line(error), type(error).__name__
     return text if isinstance(error, can.CanError | OSError) or text == kind else f"{kind}: {text}"
 
@@ -404,7 +405,7 @@ _PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 class CanLink:
     """A `StampedLink` over python-can.
 
-    Received CAN FD frames are ignored, and error frames except for the error state.
+    Received CAN FD frames are ignored. Of error frames, only the error state is used.
 
     Args:
         bus: open bus without other readers.
@@ -413,7 +414,7 @@ class CanLink:
 
     Attributes:
         lost: number of frames that the bus did not accept.
-        reads: reader of the bus, which also counts the frames that its driver could not read.
+        reads: reader of the bus. It also counts the frames that its driver could not read.
         on_error_frame: function that is called with each error frame of the driver, or None.
         on_error_state: function that is called with the error state of the controller, if the
             driver reports it, or None.
@@ -580,7 +581,7 @@ def _error_state(message: can.Message) -> ErrorState | None:
 
 
 def bus_reason(error: BaseException) -> str:
-    """Return in one line why a bus cannot be opened, with a remedy if known."""
+    """Explain in one line why a bus cannot be opened, with a remedy if known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
     hint = _HINTS.get(number) if isinstance(number, int) else None
     if _NO_MSGPACK in str(error):

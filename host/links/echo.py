@@ -16,7 +16,7 @@ ECHO_US: Final = 1_000_000
 
 
 class EchoFilter:
-    """A filter that separates the echo of sent frames from frames of other nodes.
+    """A filter that separates the echo of the host's own frames from frames of other nodes.
 
     If an equal frame of another node arrives before the echo, that frame counts as the echo. The
     echo then counts as the frame of the other node.
@@ -51,10 +51,10 @@ class EchoFilter:
 
 
 class EchoFreeLink:
-    """A `StampedLink` on the udp_multicast bus of python-can, which receives its own frames.
+    """A `StampedLink` for python-can's udp_multicast bus that drops the echo of its own frames.
 
     Args:
-        link: link with the echo.
+        link: link that also receives the frames that it sends.
     """
 
     def __init__(self, link: StampedLink) -> None:
@@ -91,5 +91,5 @@ class EchoFreeLink:
 
 
 def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
-    """Return the link without its echo, or the link itself if its interface has none."""
+    """Wrap a link to drop its echo. Return the link itself if its interface has no echo."""
     return EchoFreeLink(link) if interface in ECHOING else link

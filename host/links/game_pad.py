@@ -22,7 +22,7 @@ _Range = tuple[int, int]
 
 
 class StickPosition(NamedTuple):
-    """Deflection of the sticks, each in -1..1: forward, to the left, turning to the left."""
+    """Motion requested by the sticks: forward, to the left, and turning left, each in -1..1."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -53,7 +53,7 @@ class Axes:
 
     @property
     def hand(self) -> StickPosition:
-        """Return the deflection.
+        """Return the motion that the sticks request.
 
         The left stick gives driving forward and turning. The right stick gives driving sideways.
         """
@@ -84,7 +84,7 @@ class EvdevPad:
 
     @property
     def held(self) -> bool:
-        """Whether a button was pressed at the latest poll."""
+        """Whether a button was held at the latest poll."""
         return bool(self._axes.held)
 
     def poll(self, now_us: int, /) -> StickPosition:

@@ -21,7 +21,7 @@ TRACEBACK: Final = "Traceback (most recent call last)"
 
 
 def first_line(error: BaseException) -> str:
-    r"""Return the text of an error in one line, without a traceback.
+    r"""Return the first line of an error's text, without a traceback.
 
     If the error has no text, return the name of its type.
 
@@ -47,7 +47,7 @@ class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the lin
 
 
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
-    """The device answered with a refusal.
+    """The device refused a request.
 
     Args:
         message: text of the refusal for the user.
@@ -68,7 +68,7 @@ W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 
 
 class Link(Protocol[W]):
-    """The wire of a proxy, with its clock.
+    """The connection from a proxy to its device, with a clock.
 
     A proxy reads the time from its link, never from the clock of the machine. On a rig in virtual
     time, the same proxy waits a minute of virtual time within a millisecond.
@@ -87,7 +87,7 @@ class Link(Protocol[W]):
         """
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return received traffic, or empty traffic after `timeout_us`.
+        """Return received traffic, which is empty after the timeout `timeout_us`.
 
         Raises:
             LinkClosed: the line is gone.
@@ -103,7 +103,10 @@ StampedFrames = tuple[tuple[int, CanFrame], ...]
 
 
 class StampedLink(Link[Frames], Protocol):
-    """A link to a CAN bus with time stamps, which separate late reading from silence of the bus."""
+    """A link to a CAN bus with time stamps.
+
+    The time stamps show whether the bus was silent or the host read its frames late.
+    """
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for a first frame. Return a time, and all frames received by then.
@@ -160,11 +163,11 @@ class ReopeningLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """Time on the clock of the link, also while its line is lost."""
+        """Time on the clock of the link. The clock continues while the line is lost."""
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
-        """Send traffic, on a new link if the line was lost.
+        """Send traffic. If the line was lost, open a new link first.
 
         The method raises LinkClosed if the new link cannot be opened.
         """
@@ -178,7 +181,7 @@ class ReopeningLink(Generic[W]):
             raise
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return received traffic, empty after `timeout_us`.
+        """Return received traffic, which is empty after the timeout `timeout_us`.
 
         Raise LinkClosed if the line is lost.
         """

@@ -51,7 +51,7 @@ _Written = TypeVar("_Written", bound="int | _HasDescriptor")
 def ready(
     readers: Iterable[_Read], writers: Iterable[_Written] = (), wait_s: float | None = None
 ) -> tuple[list[_Read], list[_Written]]:
-    """Wait until descriptors can be read or written.
+    """Wait until at least one descriptor can be read or written.
 
     Args:
         readers: descriptors, or objects with a descriptor.
@@ -109,7 +109,7 @@ def _number(source: int | _HasDescriptor) -> int:
 
 
 def let_wait(opened: _HasDescriptor) -> None:
-    """Let pyserial and python-can wait for descriptors with high numbers."""
+    """Make pyserial and python-can able to wait for descriptors with high numbers."""
     try:
         number = opened.fileno()
     except (OSError, AttributeError, NotImplementedError):  # it has none

@@ -26,7 +26,7 @@ class RecordingLink(Generic[W]):
     at the same time, if only one of them sends.
 
     Args:
-        link: link to record, of bytes or frames.
+        link: link to record, which carries bytes or frames.
         path: path of the file. An existing file is replaced.
         name: name of the device in the trace, or for frames the name of the bus.
         type: device type such as `rrc`, empty if unknown.

@@ -17,7 +17,7 @@ _CONTROL_CHARACTERS: Final = 6
 
 
 def take_keys(descriptor: int) -> Callable[[], None]:
-    """Make a terminal return each key at once without echo. Reading never blocks.
+    """Make a terminal return each key at once, without echo. Reading no longer blocks.
 
     Ctrl-Z is disabled, because a program stopped by it would leave the terminal in this mode.
 
@@ -60,7 +60,7 @@ _LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
-    """A writer to a terminal in its own thread. A stuck terminal does not block the program.
+    """A writer that runs in its own thread, so that a stuck terminal does not block the program.
 
     A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
     fit into the queue is dropped.
@@ -102,7 +102,7 @@ class TerminalOutput:
             return self._changed.wait_for(lambda: not self.is_behind, within_s)
 
     def write(self, text: str, *, last: bool = False) -> None:
-        """Queue a text. The last texts are never dropped."""
+        """Queue a text. A text that is marked `last` is never dropped."""
         data = text.encode("utf-8", "replace")
         with self._changed:
             if self.gone:

@@ -83,7 +83,7 @@ class ChairStopped(Exception):  # noqa: N818 - what happened
 
 
 class NotAnRrc(LinkError):  # noqa: N818 - what is there
-    """A device that is not an RRC answers."""
+    """The device that answers is not an RRC."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class Guard:
 
 
 class DeadMan:
-    """A key that must be pressed again within a second."""
+    """A dead-man key, which must be pressed again within a second."""
 
     def __init__(self) -> None:
         self._until_us: int | None = None
@@ -151,7 +151,7 @@ class _OpeningLink:
 
 
 class Chair(Closing):
-    """An RRC protected by a guard. The end of a `with` block stops the motors.
+    """A wheelchair with an RRC, protected by a guard. The end of a `with` block stops the motors.
 
     Args:
         link: open line, which the chair closes at the end.
@@ -185,7 +185,7 @@ class Chair(Closing):
             raise
 
     def set_guard(self) -> None:
-        """Set watchdog and stablemode, as at the start and after EV:Initialized."""
+        """Set watchdog and stablemode. This is needed at the start and after EV:Initialized."""
         if self.guard.watchdog_us:
             self.client.watchdog(self.guard.watchdog_us)
         if self.guard.stable:
@@ -235,7 +235,7 @@ class Chair(Closing):
         self.client.close()
 
     def leave_driving(self) -> None:
-        """Keep the stick active after the end, without a watchdog."""
+        """Let the stick drive on after the end of the program, without a watchdog."""
         self.moved = False
 
     def _leave(self) -> None:
@@ -267,7 +267,7 @@ class Chair(Closing):
         return status
 
     def take_over(self, speed_mode: int = 1) -> None:
-        """Select driving by the host, at 0, in a speed mode."""
+        """Let the host drive, in a speed mode, and start with 0 % in both directions."""
         self.require_on()
         self.moved = True
         self.client.drive_by_host(0, 0)
@@ -293,7 +293,7 @@ class Chair(Closing):
         self.watch()
 
     def drive_by_stick(self, limit: Limit, speed_mode: int = 1) -> None:
-        """Select driving by the stick within limits, in a speed mode."""
+        """Let the stick drive within limits, in a speed mode."""
         self.require_on()
         self.moved = True
         self._sent = None
@@ -331,7 +331,9 @@ class Chair(Closing):
         return events
 
     def ask_if_silent(self) -> None:
-        """Query the name of the RRC if no status line has come for a second, as VR2 may be off.
+        """If no status line has arrived for a second, check that the RRC still answers.
+
+        VR2 may be switched off, and then sends no status lines.
 
         Raises:
             LinkTimeout: the RRC does not answer.
@@ -350,7 +352,7 @@ class Chair(Closing):
         self._asked_us = self.client.now_us
 
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
-        """Stop sending until an event arrives, like a program that hangs. Then resume sending.
+        """Simulate a program that hangs: send nothing until an event arrives, then resume sending.
 
         Args:
             kind: kind of the event.

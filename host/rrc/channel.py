@@ -138,7 +138,7 @@ _log = log_of(__name__)
 
 @dataclass(frozen=True, slots=True)
 class RrcLoad:
-    """The load of an RRC with running VR2, from the client's lines of the latest second.
+    """The load of an RRC with running VR2, computed from the client's lines of the last second.
 
     Lines that other programs send to the same RRC are not included.
 
@@ -154,7 +154,7 @@ class RrcLoad:
 
 
 class Channel:
-    """A channel that sends commands at the RRC's pace and assigns received lines to their owners.
+    """A channel that sends commands no faster than the RRC can process, and sorts received lines.
 
     To renew the watchdog, the channel sends `watchdog` again with the same value. This is the only
     command that changes no setting. With stablemode the RRC does not answer it. The channel renews
@@ -220,7 +220,7 @@ class Channel:
         return exchange.text
 
     def step(self, until_us: int) -> None:
-        """Listen once. Raise RrcStopped after one refusal too many."""
+        """Receive the next lines. Raise RrcStopped if the RRC has refused too many commands."""
         self._listen(until_us)
         self._raise_alarm()
 
@@ -230,7 +230,7 @@ class Channel:
         self._alarm = None
 
     def restart(self) -> None:
-        """Reset the state of the RRC and the commands."""
+        """Forget the known state of the RRC and the pending commands."""
         self.matcher.clear()
         self._alarm = None
 

@@ -28,7 +28,7 @@ _ANGLE: Final = click.IntRange(0, 90)
 
 @dataclass(frozen=True, slots=True)
 class RrcCall:
-    """The options before the verb.
+    """The options that precede the verb on the command line of `rrc`.
 
     Attributes:
         url: URL of the port, empty if none was given.
@@ -59,7 +59,7 @@ class _Verb(HarmlessCommand):
     """A verb whose arguments may be negative numbers, which are not options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put a blank before a negative number, so that it is not read as an option."""
+        """Parse the arguments, with a blank before negative numbers. They are then not options."""
         return super().parse_args(
             ctx, [f" {a}" if a[:1] == "-" and a[1:2].isdecimal() else a for a in args]
         )
@@ -71,7 +71,7 @@ class _RrcGroup(HarmlessCommand, click.Group):
     command_class = _Verb
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Accept options after URL too.
+        """Parse the arguments, and accept options after URL too.
 
         Accept no URL if a verb comes first, for the help of the verb.
         """

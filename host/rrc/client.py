@@ -315,7 +315,7 @@ class RrcClient(Closing):
         self.command(shape)
 
     def watchdog(self, time_us: int) -> None:
-        """Make the RRC stop VR2 after a time without a command.
+        """Set the time without a command after which the RRC stops VR2.
 
         From then on, the client renews the watchdog in each of its calls.
 

@@ -66,7 +66,7 @@ class Arrival(Generic[_T]):
 
 
 class Inbox:
-    """An inbox that reads lines, stores events and status lines, and returns the other lines.
+    """An inbox for received lines. It stores events and status lines, and returns the others.
 
     Lines that the manual does not list, and SA lines that do not match their CHECK, are kept in
     `unknown` and reported without an error. Newer firmware and noise on the line cause them.
@@ -185,20 +185,20 @@ class Exchange:
 
     @property
     def has_barrier(self) -> bool:
-        """Whether the command has no answer of its own."""
+        """Whether a query follows the command, because the command itself has no answer."""
         return len(self.lines) > 1
 
     @property
     def changes_protocol(self) -> bool:
-        """Whether no other command may be sent before this command is settled."""
+        """Whether other commands must wait until this command is settled."""
         return isinstance(self.command, StableMode | Watchdog)
 
     def refuses_barrier_too(self, reason: str) -> bool:
-        """Whether an ER refuses the query after a command that was refused itself."""
+        """Whether an ER is the second one: the command was refused before, and now its query."""
         return self.refusal is not None and self.has_barrier and reason == self._last
 
     def take(self, answer: Answer) -> bool:
-        """Handle a line if it belongs to this exchange. Return whether it does."""
+        """Process a line that belongs to this exchange. Return whether the line belongs to it."""
         match answer:
             case Refusal(reason):
                 return self._take_refusal(reason)

@@ -147,7 +147,7 @@ class ChairPanel(FramedApp):
         self._pilot.press()
 
     def action_aim(self, v_steps: int, w_steps: int) -> None:
-        """Change the aim by steps of 10 %."""
+        """Change the values to drive by steps of 10 %."""
         self._pilot.aim(v_steps * _STEP_PCT, w_steps * _STEP_PCT)
 
     def action_release(self) -> None:
@@ -171,7 +171,7 @@ class ChairPanel(FramedApp):
         self._pilot.beep()
 
     def action_interrupt(self) -> None:
-        """End the panel as the signal of Ctrl-C does."""
+        """End the panel as if the signal of Ctrl-C was received."""
         self.interrupted = True
         self.end()
 

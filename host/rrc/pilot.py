@@ -18,7 +18,7 @@ _KEPT_LINES: Final = 60
 
 
 class Drives(StrEnum):
-    """The driver of the chair, chosen in the panel."""
+    """Who drives the chair, as chosen in the panel."""
 
     STOPPED = "stopped"
     HOST = "host"
@@ -69,7 +69,7 @@ class PilotView:
 
 
 class Pilot:
-    """A pilot that steps a chair in one thread, while another thread controls and reads it.
+    """A pilot that drives a chair in one thread, while another thread controls and reads the pilot.
 
     Args:
         chair: chair that a guard protects.
@@ -98,7 +98,7 @@ class Pilot:
         self._dead_man.press(self._client.now_us)
 
     def release(self) -> None:
-        """Release the dead-man key, and aim at 0."""
+        """Release the dead-man key, and set the values to drive to 0."""
         self._dead_man.release()
         self._aim_pct = 0, 0
 
@@ -140,7 +140,7 @@ class Pilot:
     # Called by the thread of the line.
 
     def step(self) -> None:
-        """Execute requests, and drive or listen for 20 ms.
+        """Execute requests of the panel, then drive or listen for 20 ms.
 
         Raises:
             LinkError: the line is gone, or the RRC does not answer.

@@ -58,7 +58,7 @@ class Quit(Exception):  # noqa: N818 - what the operator did
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """The result of a step.
+    """The result of a step of the procedure.
 
     Attributes:
         step: title of the step.
@@ -81,7 +81,7 @@ class _Failed(Exception):  # noqa: N818 - the verdict
 
 @dataclass(slots=True)
 class Procedure:
-    """A procedure that runs the steps of both rounds.
+    """The test procedure with the RRC, which runs the steps of both rounds.
 
     Args:
         chair: chair with its watchdog, without stablemode.

@@ -44,7 +44,7 @@ _MOTION: Final = ("output", "limit")
 
 
 class OnRefusals(Enum):
-    """Reaction of the client to too many refusals in a row (RRC manual, notes)."""
+    """What the client does after too many refusals in a row (RRC manual, notes)."""
 
     POWER_OFF = "poweroff"  # send poweroff; renew the watchdog no more
     WATCHDOG = "watchdog"  # send nothing, so that the watchdog trips; poweroff if none is set
@@ -74,11 +74,11 @@ class _RefusalCounter:
         self._rows: Counter[str] = Counter()
 
     def accepted(self, name: str) -> None:
-        """Record an executed command, which ends its series of refusals."""
+        """Record an executed command. Its count of successive refusals restarts at zero."""
         del self._rows[name]
 
     def refused(self, name: str, reason: str) -> None:
-        """Record a refusal. `stopped` is set if it is one too many."""
+        """Record a refusal. If there are now too many in a row, set `stopped`."""
         self._rows[name] += 1
         if self.stopped is None and self._rows[name] >= self.limit:
             self.stopped = reason
@@ -107,7 +107,7 @@ class _BelievedSettings:
     drive: type[Limit | Output] | None = None
 
     def sent(self, command: Command) -> None:
-        """Record a command that was sent without waiting. The driver may have changed."""
+        """Record a command that was sent without waiting. It may have changed who drives."""
         if isinstance(command, Limit | Output) and self.drive is not type(command):
             self.drive = None
         else:
@@ -153,12 +153,12 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time-out of the last command sent before a restart, or 0 if none is pending."""
+        """Time-out of the last command sent before a restart, or 0 if no such command is pending."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 
     def doubt(self) -> None:
-        """Record that the RRC was initialized. Commands in its buffer are still pending."""
+        """Record that the RRC was initialized. Commands in its buffer may still be executed."""
         if self._sent:
             self._doubted_us = self._sent[-1].at_us
 
@@ -167,7 +167,7 @@ class _UnconfirmedCommands:
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Remove the command of an OK. Return the newest command with its name.
+        """Remove the command that an OK confirms. Return the newest command of the same name.
 
         The newest command counts, because the RRC has executed it or will execute it. There is one
         exception: the RRC lost its power together with older commands, and this OK is the reply to
@@ -180,7 +180,7 @@ class _UnconfirmedCommands:
         return same[-1].command
 
     def refused(self, reason: str) -> str | None:
-        """Remove the command of an ER. Return its name."""
+        """Remove the command that an ER refuses. Return the name of the command."""
         wanted = (*_MOTION, None) if reason in NAMELESS else (reason,)
         for name in wanted:
             for sent in self._sent:
@@ -250,7 +250,7 @@ class ReplyMatcher:
             self.refusals.accepted(name)
 
     def initialized(self) -> None:
-        """Record that the RRC was initialized, so that all known settings are lost.
+        """Record that the RRC was initialized and has lost all settings.
 
         A command that waited in the receive buffer of the RRC is still executed afterwards.
         """

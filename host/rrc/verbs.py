@@ -49,7 +49,7 @@ _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """The signal that was received. The loops check it, and no call is interrupted.
+    """A record of a received signal. Loops check it, so that no call is interrupted.
 
     Attributes:
         number: number of the first signal, or 0 if no signal was received.
@@ -64,7 +64,7 @@ class Ended:
 
 @contextmanager
 def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
-    """Open the port of this call and guard the chair. At the end, stop it, and end the command.
+    """Open the port given on the command line, and guard the chair. At the end, stop the chair.
 
     Args:
         ended: object that records the signals.
@@ -106,7 +106,7 @@ def _lost(call: RrcCall, error: LinkError, chair: Chair | None) -> str:
 
 
 def described(status: StatusA) -> dict[str, int]:
-    """Return the values in a status line, under the names of the emulator."""
+    """Return the values of a status line by the names that the emulator uses."""
     values = asdict(status)
     return {shown: values[name] for name, shown in _FIELDS.items()}
 

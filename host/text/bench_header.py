@@ -26,7 +26,7 @@ class WireType(StrEnum):
 
 
 class Place(StrEnum):
-    """Place of the recording, at the devices, tick by tick, or at the host's port."""
+    """The place where a trace was recorded: at the devices, tick by tick, or at the host's port."""
 
     DEVICE = "device"
     PORT = "port"
@@ -100,7 +100,7 @@ class BenchHeader:
                 )
 
     def on_can(self, name: str) -> bool:
-        """Return whether a device receives frames, and not bytes."""
+        """Return whether a device receives CAN frames instead of bytes."""
         return self.wires[self.devices[name].wire].type is WireType.CAN
 
     def encode(self) -> str:
@@ -172,7 +172,10 @@ class _Reader:
         self.values, self._owner = values, owner
 
     def take(self, name: str, expected: type, *default: Any) -> Any:
-        """Return a value of a type, or the default. Raise ValueError without both."""
+        """Return a value of the expected type, or the default.
+
+        Raise ValueError if the value has another type, or if it is missing and there is no default.
+        """
         value = self.values.get(name, *default)
         if type(value) is not expected and not (default and value == default[0]):
             raise ValueError(f"{self._owner} has no {name}, or a bad one: {value!r:.60}")

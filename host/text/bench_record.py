@@ -57,9 +57,9 @@ class BenchRecord(NamedTuple):
     Attributes:
         at_us: time of the tick, or time at the host's port.
         name: name of the device, or for `~` the name of the wire.
-        mark: mark that is the kind of the line.
-        traffic: traffic of `>` and `<`.
-        text: text of `!` and `~`.
+        mark: mark that shows the kind of the line.
+        traffic: bytes or frame of a `>` or `<` line.
+        text: text of a `!` or `~` line.
         line: number of the line in its file, from 1.
     """
 
@@ -84,13 +84,16 @@ class BenchRecord(NamedTuple):
 
     @property
     def change(self) -> tuple[str, Setting] | None:
-        """The changed input and its value for `!`, or None for a reset and controller reports."""
+        """Name and value of the changed input in a `!` line.
+
+        The result is None if the line is a reset or a report of a CAN controller.
+        """
         name, equals, value = self.text.partition("=")
         return (name, json.loads(value)) if equals else None
 
 
 def change_text(name: str, value: Setting) -> str:
-    """Return the text of a set input for `!`.
+    """Return the text of a `!` line that sets an input.
 
     >>> change_text("0x1008", "a b"), change_text("load_nm", 0.5)
     ('0x1008="a b"', 'load_nm=0.5')
@@ -99,7 +102,7 @@ def change_text(name: str, value: Setting) -> str:
 
 
 class BenchParser:
-    """A parser for the lines after a header.
+    """A parser for the lines of a trace after its header.
 
     Args:
         header: header with the names and wires.
@@ -111,7 +114,7 @@ class BenchParser:
         self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
-        """Read line by line. Times must not decrease, and no line may follow the end.
+        """Parse the lines one by one. Times must not decrease, and no line may follow the end mark.
 
         Raises:
             TraceError: a line is damaged.

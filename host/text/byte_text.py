@@ -32,7 +32,7 @@ def escape(data: bytes) -> str:
 
 
 def unescape(text: str) -> bytes:
-    r"""Read the text of `escape`.
+    r"""Return the bytes of a text that `escape` made.
 
     Raises:
         ValueError: the text has a character or an escape that `escape` never writes.

@@ -15,7 +15,7 @@ Scalar = Key
 
 
 class FilePlace(NamedTuple):
-    """A line of a file. Line 0 stands for the file as a whole. The file may have no name."""
+    """A file name and a line number. Line 0 stands for the whole file. The name may be empty."""
 
     file: str
     line: int

@@ -21,13 +21,13 @@ _STYLE: Final = "page.css"
 
 
 class PageTemplate:
-    """The template of a page, in the folder `template` of a package.
+    """An HTML page's template, stored in the folder `template` of a package.
 
     Args:
         package: name of the package.
         names: filters and globals of the template, besides the common ones.
-        script: file of the page's script, empty for none.
-        page: file of the template.
+        script: file name of the page's script, empty if the page has no script.
+        page: file name of the template.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class PageTemplate:
         self._template = environment.get_template(page)
 
     def render(self, **values: Any) -> str:
-        """Return the page for these values. Equal values always give the same bytes."""
+        """Return the page with these values filled in. Equal values always give the same page."""
         policy = page_text.content_policy(self._style, self._script)
         return self._template.render(
             style=Markup(self._style), script=Markup(self._script), policy=policy, **values

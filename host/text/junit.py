@@ -34,7 +34,7 @@ class JunitCase:
         name: name of the case.
         tag: tag of the case: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`, or empty if the case
             passed.
-        message: reason in one line. An `OUTPUT` has none.
+        message: reason in one line, empty for an `OUTPUT`.
         text: details of the case.
         duration_us: duration of the case, or None if unknown.
     """

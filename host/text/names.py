@@ -14,7 +14,7 @@ _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
 def known(names: Iterable[str]) -> str:
-    """List the names, or the first names and the number of names.
+    """Return the names as one text. A long list is cut, and the number of names is added.
 
     >>> known(["stick", "lamp"])
     'stick, lamp'
@@ -26,7 +26,7 @@ def known(names: Iterable[str]) -> str:
 
 
 def near(name: str, names: Iterable[str]) -> str:
-    """Return a suggestion of the probable name, or the list of the known names.
+    """Suggest the name that was probably meant, or list the known names.
 
     >>> near("stik", ["stick", "lamp"]), near("x", ["stick", "lamp"])
     ("did you mean 'stick'?", 'known: stick, lamp')
@@ -41,7 +41,7 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the probable name, ignoring case. The list is empty if no name is similar.
+    """Return the most similar name, ignoring case, or an empty list if no name is similar.
 
     A name that differs only in its numbers is another name, not a misspelling.
 

@@ -20,7 +20,7 @@ _LISTING: Final = ' style="max-height:30em;overflow:auto;font-family:monospace;l
 
 
 def text(value: object) -> str:
-    """Return a value as escaped text.
+    """Return a value as text with escaped HTML characters.
 
     A long text is cut, and the number of omitted characters is added.
     """
@@ -48,7 +48,7 @@ def table(
     opened: bool = False,
     most: int = 200,
 ) -> str:
-    """Return a table, empty if there are no rows.
+    """Return an HTML table, or an empty text if there are no rows.
 
     Args:
         columns: titles of the columns.

@@ -26,14 +26,14 @@ _NO_CELL: Final = re.compile(f"[\x00-\x1f\x7f{_MARKS}]")
 
 
 def harmless(value: Any) -> Any:  # a template prints values of any type
-    """Return a text with visible control characters and direction marks."""
+    """Make control characters and direction marks in a text visible."""
     if type(value) is not str or (value.isascii() and value.isprintable()):
         return value
     return _UNSEEN.sub(_shown, value.replace("\r\n", "\n"))
 
 
 def one_line(value: str) -> str:
-    r"""Return a harmless text in one line.
+    r"""Return a text in one line, with visible control characters.
 
     >>> one_line("a\nFAIL b")
     'a␊FAIL b'
@@ -117,7 +117,7 @@ def seconds(us: int) -> str:
 
 
 def size(characters: int) -> str:
-    """Return the length of a text as text.
+    """Return a number of characters as a size for the user.
 
     >>> size(999), size(3_600), size(1_100_000)
     ('999 bytes', '3.6 kB', '1.1 MB')

@@ -54,7 +54,7 @@ _LONGEST: Final = 60
 
 
 def shown(value: object) -> str:
-    """Return a value in one short line.
+    """Describe a TOML value in one short line.
 
     >>> shown(True), shown({"a": 1}), shown("x")
     ('true', 'a table', "'x'")
@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def anything(value: Any) -> Any:
-    """Accept any value, because `Section.sub` or `Section.tables` reads the value."""
+    """Accept any value. `Section.sub` or `Section.tables` checks it later."""
     return value
 
 
@@ -92,7 +92,7 @@ def string(value: object) -> str:
 
 
 def matching(accepts: Callable[[str], object], what: str) -> _Taker:
-    """Return a taker for texts that a function accepts. `what` describes them in messages."""
+    """Return a function that accepts a text if `accepts` does. `what` describes the valid texts."""
 
     def take(value: object) -> str:
         if isinstance(value, str) and accepts(value):
@@ -152,7 +152,7 @@ def lines(value: object) -> dict[str, str]:
 
 
 def whole(low: int, high: int) -> _Taker:
-    """Return a taker for whole numbers in a range."""
+    """Return a function that accepts whole numbers in a range."""
 
     def take(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
@@ -163,7 +163,7 @@ def whole(low: int, high: int) -> _Taker:
 
 
 def number(low: float, high: float, *, above: bool = False) -> _Taker:
-    """Return a taker for numbers in a range. `above` excludes the lower end of the range."""
+    """Return a function that accepts numbers in a range. `above` excludes the lower end."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
     def take(value: object) -> float:
@@ -177,7 +177,7 @@ def number(low: float, high: float, *, above: bool = False) -> _Taker:
 
 
 def one_of(*names: str) -> _Taker:
-    """Return a taker for one of several words."""
+    """Return a function that accepts one of several words."""
 
     def take(value: object) -> str:
         if isinstance(value, str) and value in names:
@@ -211,7 +211,7 @@ _MOST: Final = 500
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A key of a table.
+    """The definition of a key in a TOML table.
 
     Attributes:
         field: function that converts the value of the field.
@@ -231,7 +231,7 @@ Schema = Mapping[str, Field]
 
 
 def rows(schema: Schema) -> Iterator[str]:
-    """Yield the lines of a schema's table for the documentation page."""
+    """Yield the lines of a Markdown table that documents the keys of a schema."""
     yield "| key | value | unless given | meaning |"
     yield "|---|---|---|---|"
     for name, key in schema.items():
@@ -240,12 +240,12 @@ def rows(schema: Schema) -> Iterator[str]:
 
 @dataclass(slots=True)
 class Notes:
-    """The errors of a document.
+    """The errors found in a TOML document.
 
     Attributes:
         document: document with the errors.
         mistakes: errors found until now.
-        names: other names that values have in the file, empty for a rig file.
+        names: names of values in the file if they differ from the TOML keys, empty for a rig file.
     """
 
     document: TomlDocument
@@ -258,7 +258,7 @@ class Notes:
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return the start of an error message, which contains the keys as written in the file."""
+        """Return the start of an error message: the keys as written in the file, and a colon."""
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
@@ -270,7 +270,7 @@ class Notes:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A table of the document.
+    """A table of a TOML document.
 
     Attributes:
         notes: errors of the whole document.
@@ -287,12 +287,12 @@ class Section:
         self.notes.wrong((*self.keys, *keys), reason)
 
     def unknown(self, reason: str, *keys: str | int) -> None:
-        """Add an error for an unknown name, unless its table may be unreadable."""
+        """Report an unknown name, unless the document has tables that could not be read."""
         if self.notes.document.whole:
             self.wrong(reason, *keys)
 
     def read(self, schema: Schema, *others: str) -> dict[str, Any]:
-        """Read the values of a schema. Report and omit invalid values.
+        """Return the values of the table, converted by a schema. Report and omit invalid values.
 
         Args:
             schema: fields by key.
@@ -354,20 +354,20 @@ class Section:
         ]
 
     def subs(self, *but: str) -> Iterator[tuple[str, Section | None]]:
-        """Yield all keys except some, each with its table."""
+        """Yield each key with its table, except for the keys in `but`."""
         for key in self.values:
             if key not in but:
                 yield key, self.sub(key)
 
 
 def read_section(text: str) -> Section:
-    """Read a TOML text. The mistakes of the text are in `notes`."""
+    """Parse a TOML text and return its top table. Errors of the text are in `notes`."""
     document = read_toml(text)
     return Section(Notes(document), (), document.values)
 
 
 def in_a_line(mistakes: Sequence[Mistake]) -> str:
-    """Return the first error, and the number of other errors, as text.
+    """Describe the first error, and count the others, in one line.
 
     >>> in_a_line([Mistake(3, "no key 'a'"), Mistake(4, "no key 'b'")])
     "line 3: no key 'a' (and 1 mistake more)"
@@ -378,7 +378,7 @@ def in_a_line(mistakes: Sequence[Mistake]) -> str:
 
 
 def is_broken(value: object) -> bool:
-    """Return whether a value, or a part of the value, is invalid TOML that is already reported."""
+    """Return whether a value has invalid TOML in it, which is already reported as an error."""
     match value:
         case dict():
             return any(map(is_broken, value.values()))

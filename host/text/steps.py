@@ -27,12 +27,12 @@ _COMMENT: Final = re.compile(r"(^|\s)#.*")
 
 
 class StepError(ValueError):
-    """Invalid steps. The message is `FILE:LINE: the value, and what is allowed`."""
+    """Steps in a file are invalid. The message is `FILE:LINE: the value, and what is allowed`."""
 
 
 @dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
 class Condition(Generic[_Came]):
-    """An expectation with its text and its condition."""
+    """An expected event: its text in the file, and a function that recognizes the event."""
 
     text: str
     matches: Callable[[_Came], bool]
@@ -40,7 +40,9 @@ class Condition(Generic[_Came]):
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Generic[_What, _Came]):
-    """One step. Its parts run in the order of the attributes, and most steps have only one part.
+    """One step of a sequence.
+
+    The parts of a step run in the order of the attributes. Most steps have only one part.
 
     Attributes:
         place: place of the step in its file.
@@ -68,7 +70,7 @@ class Step(Generic[_What, _Came]):
 
     @property
     def takes_time(self) -> bool:
-        """Whether the step waits for anything, so that endless repetition is allowed."""
+        """Whether the step waits for anything. Only such a step may be repeated endlessly."""
         return bool(self.at_us or self.wanted) or any(step.takes_time for step in self.steps)
 
 

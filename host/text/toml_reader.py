@@ -33,7 +33,7 @@ BROKEN: Final = _Broken.BROKEN
 
 
 class Mistake(NamedTuple):
-    """One error in a text.
+    """One error in a TOML text.
 
     Attributes:
         line: number of the line, from 1.
@@ -49,7 +49,7 @@ TomlPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class TomlDocument:
-    """The result of reading a text.
+    """The result of reading a TOML text.
 
     Attributes:
         values: values of the text, with `BROKEN` in place of invalid values.
@@ -106,7 +106,7 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table of a key on the path of a header. For an array, return the last table.
+        """Return the table of a key in the path of a header, or the last table of an array.
 
         Raises:
             _TakenError: the key has another value.
@@ -119,7 +119,7 @@ class _Table:
         return node
 
     def open(self, line: int, key: str) -> _Table:
-        """Return the table of a header `[key]`. Raise _TakenError if there cannot be one."""
+        """Open the table of a header `[key]`. Raise _TakenError if the key is already in use."""
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:
             raise _TakenError(key, node.line)
@@ -127,7 +127,7 @@ class _Table:
         return node
 
     def add(self, line: int, key: str) -> _Table:
-        """Return a new table of a header `[[key]]`. Raise _TakenError if there cannot be one."""
+        """Append a table for a header `[[key]]`. Raise _TakenError if the key has another value."""
         node = self.entries.setdefault(key, _Array(line, frozen=False))
         if not isinstance(node, _Array) or node.frozen:
             raise _TakenError(key, node.line)
@@ -137,7 +137,7 @@ class _Table:
     def dotted(self, line: int, key: str) -> _Table:
         """Return the table of the first part of a dotted key.
 
-        Raise _TakenError if there is none.
+        Raise _TakenError if the key has another value.
         """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:
@@ -204,7 +204,7 @@ _STATEMENT: Final = re.compile(
 
 
 def load_toml(text: str) -> dict[str, Any]:
-    """Return the values of a text, read by the parser of the standard library.
+    """Parse a TOML text with the parser of the standard library.
 
     Args:
         text: whole text.

@@ -41,7 +41,7 @@ _INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]
 
 
 class TraceError(ValueError):
-    """A file that is not a trace of this version."""
+    """The file is not a trace of this version."""
 
 
 class Mark(StrEnum):
@@ -56,7 +56,7 @@ class Mark(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Data for rebuilding the device in a replay."""
+    """The first line of a trace: the data for rebuilding the device in a replay."""
 
     device: str
     config: Config = field(default_factory=dict)
@@ -73,8 +73,8 @@ class Record:
     Attributes:
         at_us: time of the tick.
         mark: kind of the line.
-        data: traffic of `>` and `<`.
-        text: text of `!`, which is `NAME=VALUE` or `reset`.
+        data: bytes of a `>` or `<` line.
+        text: text of a `!` line, which is `NAME=VALUE` or `reset`.
         line: number of the line in its file, from 1.
     """
 
@@ -91,13 +91,13 @@ class Record:
 
     @property
     def change(self) -> tuple[str, Setting]:
-        """The changed input and its value, for `!`."""
+        """Name and value of the changed input in a `!` line."""
         name, _, value = self.text.partition("=")
         return name, parse_setting(value)
 
 
 def trace_text(data: bytes) -> str:
-    """Return the text of a trace.
+    """Decode the bytes of a trace.
 
     Raise TraceError if the text is empty or its first line is incomplete.
     """
@@ -129,7 +129,7 @@ def parse_header(line: str) -> Header:
 
 
 def parse_record(line: str, number: int) -> Record:
-    """Read a line of the body. Raise TraceError if it is invalid."""
+    """Parse a line after the header. Raise TraceError if it is invalid."""
     match = _LINE.fullmatch(line)
     if match is None:
         raise TraceError(f"line {number} is not 'SECONDS MARK TEXT': {line!r:.60}")
@@ -148,7 +148,11 @@ def parse_record(line: str, number: int) -> Record:
 
 
 def parse_records(lines: Iterable[str]) -> Iterator[Record]:
-    """Read the body line by line. Times must not decrease, and no line may follow the end."""
+    """Parse the lines after the header.
+
+    Times must not decrease, and no line may follow the end mark.
+
+    """
     before = Record(0, Mark.PHYSICAL)
     for number, line in enumerate(lines, 2):
         record = parse_record(line, number)

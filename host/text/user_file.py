@@ -33,7 +33,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
 
 
 def explain_error(error: BaseException, file: str = "") -> str:
-    """Return an error in a user's file as one line, with its place if known."""
+    """Describe an error in a user's file in one line, with file and line number if known."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"
     import traceback  # noqa: PLC0415 - slow

@@ -92,7 +92,7 @@ MOST_PORT: Final = 0xFFFF
 
 
 def parse_port(text: str) -> int | None:
-    """Read a TCP port, 0..65535. Return None if it is invalid, with any number of digits.
+    """Read a TCP port, 0..65535, with any number of digits. Return None if it is invalid.
 
     >>> parse_port("7000"), parse_port("007000"), parse_port("0100000"), parse_port("-1")
     (7000, 7000, None, None)
@@ -117,7 +117,7 @@ Setting = int | float | str
 
 
 def parse_setting(word: str) -> Setting:
-    """Read a value, which is a number if the text looks like one, or else the text.
+    """Convert a text to a number if it looks like one. Otherwise return the text itself.
 
     >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
     [5, -31, 0.001, 'ready', 'nan']

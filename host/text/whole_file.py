@@ -14,7 +14,7 @@ from tickrig.host.text.log import log_of
 
 
 def check_file(path: Path, what: str) -> None:
-    """Check before a run whether a file can be written after it.
+    """Check before a run that a file can be written after the run.
 
     Args:
         path: path of the file.
@@ -63,7 +63,7 @@ def is_special(path: Path) -> bool:
 
 
 def check_writable(folder: Path) -> None:
-    """Check whether files can be made in a folder, by making a file. The folder may be missing.
+    """Check by a test file that files can be made in a folder. The folder need not exist.
 
     Raises:
         OSError: no file can be made in the folder.
@@ -79,7 +79,7 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Replace a file after the new content is on the disk. Write directly to a pipe and the like.
+    """Replace a file once the new content is on the disk. A pipe or similar is written directly.
 
     Raises:
         OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged.
@@ -91,10 +91,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the path of a new file, which replaces the given file at the end of the block.
+    """Yield a path for new content. At the end of the block, the new file replaces the given file.
 
-    The new file has the same name, in a new folder next to the given file. If the path is not a
-    regular file, for example a pipe, the path itself is yielded.
+    The new file has the same name and is in a new folder next to the given file. If the path is not
+    a regular file, for example a pipe, the path itself is yielded.
 
     Raises:
         OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged. An
@@ -152,7 +152,7 @@ _BINARY: Final[int] = getattr(os, "O_BINARY", 0)
 
 
 class LineFile:
-    """A file of lines. Each line is written at once, so that killing the process loses no line.
+    """A text file in which each line is written at once, so that killing the process loses no line.
 
     If writing fails, the recording ends with one warning, and the run continues.
 

@@ -59,10 +59,10 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
 
     Args:
         text: content of the whole file.
-        name: name of the file in places.
+        name: name of the file for error messages.
 
     Returns:
-        The tree, or None if the text has none, and the errors.
+        The content as a tree, or None if the text has no content, and the errors.
     """
     try:
         root = _composed(text)
