@@ -32,7 +32,7 @@ class UrgScan:
     specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
-        """Return the direction of a distance by its number: 0 is straight ahead, left is positive."""
+        """Return the direction of a distance by its number. Left of straight ahead is positive."""
         step = self.first + place * self.cluster + (self.cluster - 1) / 2
         return (step - self.specification.front) * tau / self.specification.resolution
 

@@ -153,7 +153,7 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time-out of the last command sent before a restart, or 0 if no such command is pending."""
+        """Time-out of the last command sent before a restart, or 0 if none of these is pending."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 

@@ -77,9 +77,9 @@ P = TypeVar("P", bound=AnyPort)
 def guarded(
     who: str, callback: Callable[A, ReturnCode], *args: A.args, **kwargs: A.kwargs
 ) -> ReturnCode:
-    """Run a callback. An exception is logged and counts as RTC_ERROR.
+    """Run a callback and return its code. An exception is logged and counts as RTC_ERROR.
 
-    Any exception is caught, also an exception of a listener of a port, so that one component cannot
+    Every exception is caught, also from a listener of a port, so that a faulty component cannot
     end the others.
     """
     try:
@@ -89,7 +89,7 @@ def guarded(
 
 
 def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
-    """Log the exception that a callback has raised. The exception counts as RTC_ERROR."""
+    """Log the exception that a callback has raised, and return RTC_ERROR."""
     _LOG.exception("%s: %s raised", who, callback.__name__)
     return ReturnCode.RTC_ERROR
 
@@ -135,11 +135,11 @@ class ComponentAction:
         return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period of `ec` in Active, in the first pass."""
+        """Do the work of a period of `ec` while the component is Active."""
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period in Active, after on_execute of every component of `ec`."""
+        """Do further work of a period in Active, after on_execute of all components of `ec`."""
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
@@ -147,7 +147,10 @@ class ComponentAction:
         return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period of `ec` in Error. The return value is ignored."""
+        """Do the work of a period of `ec` while the component is in Error.
+
+        The result is ignored.
+        """
         return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
@@ -179,7 +182,7 @@ class ModuleSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentProfile(ModuleSpec):
-    """A component as OpenRTM describes it, with properties of its class and its own properties."""
+    """The profile of a component, as in OpenRTM, with properties of its class and its own."""
 
     instance_name: str
     port_profiles: tuple[PortProfile, ...]
@@ -252,7 +255,7 @@ class RtComponent(ComponentAction):
         port.owner = ""
 
     def own(self, context: ExecutionContext) -> ReturnCode:
-        """Take part in an execution context that ends with this component.
+        """Own an execution context and take part in it. The context ends with this component.
 
         Args:
             context: execution context that the component will own.
@@ -341,9 +344,9 @@ class _Participant:
         self._updates = type(component).on_state_update is not base
 
     def request(self, source: LifeCycleState, wanted: LifeCycleState) -> ReturnCode:
-        """Request a move.
+        """Request a move from one state to another.
 
-        Return PRECONDITION_NOT_MET unless in `source` and not moving to Error.
+        Return PRECONDITION_NOT_MET if the component is not in `source`, or is moving to Error.
         """
         if self.state is not source or self.wanted is _ERROR:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -358,7 +361,7 @@ class _Participant:
     def notify(self, callback: _Callback) -> ReturnCode:
         """Run a callback and return its code.
 
-        If the callback fails, the component moves to Error next.
+        If the callback fails, the component moves to Error in the next pre-pass.
         """
         code = self._call(callback)
         if code is not _OK:
@@ -366,7 +369,7 @@ class _Participant:
         return code
 
     def pre(self) -> None:
-        """Make the wanted move, in the first pass of a period."""
+        """Make the requested move, in the first pass of a period."""
         if self.component.configuration.changed:
             self.notify(self._update_configuration)
         if (wanted := self.wanted) is not None:
@@ -389,7 +392,7 @@ class _Participant:
             self.notify(self.component.on_state_update)
 
     def leave(self) -> None:
-        """Leave Active at once, as a component that ends does. The state is then Created."""
+        """Leave the context at once, because the component ends. The state is then Created."""
         code = self._call(self.component.on_deactivated) if self.state is _ACTIVE else _OK
         left, self.state, self.wanted = self.state is not _CREATED, _CREATED, None
         if left and self._context.on_move:
@@ -449,7 +452,7 @@ _MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[_Participant
 
 
 class ExecutionContexts:
-    """Execution contexts that are ticked together, in the order in which they were added.
+    """A group of execution contexts that are ticked together, in the order of adding.
 
     The object keeps the earliest due time. A tick before that time does not check the contexts,
     which would take 11 us of each tick with 127 contexts.
@@ -486,7 +489,7 @@ class ExecutionContexts:
             context.tick(now_us)
 
     def replan(self) -> None:
-        """Record that the due time of a context has changed."""
+        """Record that the earliest due time must be computed again."""
         self._known = False
 
     def add(self, context: ExecutionContext, now_us: int) -> None:
@@ -748,7 +751,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def state_of(self, component: RtComponent) -> LifeCycleState:
-        """Return the state of a component here, or Created if it is not alive or takes no part."""
+        """Return the state of a component in this context.
+
+        The state is Created if the component is not alive or does not take part in the context.
+        """
         participant = self._find(component)
         if participant is None or not component.alive:
             return LifeCycleState.CREATED

@@ -36,7 +36,7 @@ _SEQ_PORTS: Final[Mapping[str, Any]] = {
 
 
 class ConsoleIn(RtComponent):
-    """A component that writes one entered number in each period.
+    """A component that writes numbers entered by the user, one in each period.
 
     The component of OpenRTM waits for a number. This component does not block. Instead, the owner
     of the console calls `enter`.
@@ -99,7 +99,9 @@ class ConsoleOut(RtComponent):
 
 
 class SeqIn(RtComponent):
-    """A component that keeps the latest value of each port. The OpenRTM component displays them.
+    """A component that keeps the latest value of each port.
+
+    The component of this name in OpenRTM displays the values instead.
 
     Attributes:
         ins: ports by name.
@@ -122,7 +124,9 @@ class SeqIn(RtComponent):
 
 
 class SeqOut(RtComponent):
-    """A component that writes counted values to its ports in each period. OpenRTM's are random.
+    """A component that writes increasing values to its ports in each period.
+
+    The component of this name in OpenRTM writes random values.
 
     Attributes:
         outs: ports by name.
@@ -156,7 +160,7 @@ class SeqOut(RtComponent):
 
 
 class ConfigSample(RtComponent):
-    """A component with unused parameters. The names and defaults are those of OpenRTM."""
+    """A sample component with parameters that it does not use, named as in OpenRTM."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConfigSample", "Configuration example component")
 

@@ -108,7 +108,7 @@ class Parameter(Generic[V]):
             raise ValueError(f"{name} = {default!r} is not in its constraint {constraint}")
 
     def parse(self, text: str) -> V:
-        """Return the value that a text stands for.
+        """Convert a text to a value of the parameter.
 
         Raises:
             RtcRefused: the text is not a value of the type, or the constraint does not allow it.
@@ -126,12 +126,12 @@ class Parameter(Generic[V]):
 
     @property
     def text(self) -> str:
-        """The default as text in a configuration set."""
+        """The default value as text for a configuration set."""
         return as_text(self.default)
 
 
 def as_text(value: object) -> str:
-    """Return a value as text in a configuration set. Commas separate the elements of a tuple."""
+    """Convert a value to text for a configuration set. Commas separate the elements of a tuple."""
     if isinstance(value, tuple):
         return ",".join(as_text(element) for element in value)
     return str(value).lower() if isinstance(value, bool) else str(value)
@@ -193,7 +193,7 @@ DEFAULT: Final = "default"
 
 
 class Configuration:
-    """The sets of parameter values, of which one set is active.
+    """The configuration sets of a component. Each set has values for the parameters; one is active.
 
     A change is checked at once. The change takes effect before the callbacks of the component's
     next period, at `initialize`, or when `update` is called.

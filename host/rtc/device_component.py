@@ -24,10 +24,11 @@ C = TypeVar("C", bound=_DeviceClient)
 
 
 class DeviceComponent(RtComponent, ABC, Generic[C]):
-    """A component that opens a client when it is activated, and closes it when it is deactivated.
+    """A component that communicates with a device while it is Active, by a client for the device.
 
-    If the line fails or the device refuses, the component logs the reason, closes the client and
-    goes to Error. The next activation opens a new client.
+    The component opens the client when it is activated, and closes it when it is deactivated. If
+    the line fails or the device refuses, the component logs the reason, closes the client and goes
+    to Error. The next activation opens a new client.
 
     Attributes:
         client: client that communicates with the device while the component is Active.

@@ -29,7 +29,7 @@ _PROBE_US: Final = 1_000_000
 
 
 def probe() -> Script[None]:
-    """Request the device type until an answer arrives, which may be an abort."""
+    """Request the device type again and again until the node answers. An abort is an answer too."""
     while True:
         try:
             yield from upload_number(_DEVICE_TYPE, 0)
@@ -44,7 +44,9 @@ def probe() -> Script[None]:
 def boot(
     entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]
 ) -> Script[tuple[PdoLayout, ...]]:
-    """Set up a node with identity, heartbeat, values and PDOs. Return the enabled PDOs.
+    """Set up a node and return its enabled PDOs.
+
+    The set-up checks the identity, and writes heartbeat, values and PDOs.
 
     Raises:
         WrongIdentity: the node is another device.
@@ -65,7 +67,7 @@ def boot(
 
 
 def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
-    """Write given parameters of a PDO while it is off. Then enable the PDO if it has a CAN-ID."""
+    """Disable a PDO, write the given parameters, and enable the PDO if it has a CAN-ID."""
     cob_id = pdo.cob_id
     if cob_id is None:
         cob_id = (yield from upload_number(index, _COB_ID)) & ~INVALID

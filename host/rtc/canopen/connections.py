@@ -17,7 +17,9 @@ from tickrig.host.rtc.system.manager import Manager
 
 
 class PortConnections:
-    """Connections of ports, made as soon as both ports exist, and again after a component returns.
+    """The wanted connections of ports. Each connection is made as soon as both ports exist.
+
+    If a component goes and returns, its connections are made again.
 
     Args:
         manager: manager with the ports.
@@ -37,12 +39,12 @@ class PortConnections:
 
     @property
     def all(self) -> tuple[definition.RtConnection, ...]:
-        """The connections that are made, followed by the connections that are not made yet."""
+        """The existing connections, followed by those that are not made yet."""
         made = (_entry(profile) for profile in self._manager.connectors)
         return (*made, *self.wanted)
 
     def make(self) -> None:
-        """Make the connections whose ports exist. A connection that is impossible is given up."""
+        """Make all connections whose ports exist. Give up a connection that is impossible."""
         for entry in tuple(self.wanted):
             try:
                 if not are_there(self._manager, entry):
@@ -54,7 +56,7 @@ class PortConnections:
             self._connect(entry)
 
     def keep(self, component: RtComponent) -> None:
-        """Schedule the connections of a component that is about to go, so that they return."""
+        """Remember the connections of a component that is removed, to make them again later."""
         profiles = (
             connector.profile
             for port in component.ports.values()
@@ -87,7 +89,10 @@ class PortConnections:
 
 
 def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
-    """Return whether both components exist. Raise RtcRefused if an existing one lacks the port."""
+    """Return whether the components of a connection exist.
+
+    Raise RtcRefused if a component exists, but not its port.
+    """
     names = {component.instance_name for component in manager.components}
     ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
     for end in ends:
@@ -101,7 +106,9 @@ def _entry(profile: ConnectorProfile) -> definition.RtConnection:
 
 
 class PdoLinks:
-    """PDO links, made when both nodes are ready. An RPDO receives the TPDO of another node.
+    """PDO links between nodes, made when both nodes are ready.
+
+    A link sets the CAN-ID of an RPDO, so that it receives the TPDO of another node.
 
     Args:
         nodes: nodes by node-ID.
@@ -109,7 +116,7 @@ class PdoLinks:
         notify: function that is called with the result for each link.
 
     Attributes:
-        links: all wanted links, made or not.
+        links: all wanted links, whether they are made or not.
     """
 
     def __init__(
@@ -141,7 +148,7 @@ class PdoLinks:
     def make(self, now_us: int, node_id: int) -> None:
         """Make the links of a node that has become ready.
 
-        A target that stayed still has its link.
+        If the node is only the source of a link whose target was not reset, the link still exists.
         """
         for link in self.links:
             if link.target.node == node_id:
@@ -205,7 +212,7 @@ def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLa
 def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
     """Raise ServerRefused if the frames of the two PDOs differ in length.
 
-    An RPDO with Booleans is filled up with dummy bits. A TPDO with the same Booleans is not.
+    An RPDO with Booleans contains dummy bits as filling. A TPDO with the same Booleans does not.
     """
     if source.size != target.size:
         raise definition.ServerRefused(

@@ -21,10 +21,10 @@ _Send = Callable[[int, bytes], None]
 
 
 class PdoDataFlow:
-    """Data flow that writes received PDOs to OutPorts, and sends the values of InPorts.
+    """The data flow by PDO: received PDOs go to OutPorts, and values of InPorts are sent.
 
-    Data pass while the proxy is Active. Data to the device also wait until the device is
-    Operational.
+    Data flow while the proxy is Active. Data are sent to the device only after the device has
+    become Operational.
 
     Args:
         nodes: nodes by node-ID.
@@ -39,7 +39,7 @@ class PdoDataFlow:
         self._written = set[int]()  # places in _connected: 126 sinks are not looked at each tick
 
     def route(self) -> None:
-        """Rebuild the tables of PDOs with their OutPorts, and of InPorts with connectors."""
+        """Rebuild two tables: received PDOs with their OutPorts, and InPorts with connectors."""
         self._sources = {}
         for node in self._nodes.values():
             for source in node.proxy.sources if node.proxy else ():
@@ -65,7 +65,7 @@ class PdoDataFlow:
         self.route()
 
     def receive(self, now_us: int, frame: CanFrame) -> bool:
-        """Process a frame. Return False if it is not a PDO of a proxy."""
+        """Process a received frame. Return False if the frame is not a PDO of a proxy."""
         routes = self._sources.get(frame.can_id, ())
         for node, source in routes:
             if len(frame.data) < source.size:
@@ -88,7 +88,7 @@ class PdoDataFlow:
                     self._notify(ServerEventType.VALUE_REFUSED, node.entry.id, text)
 
     def put(self, name: str, value: Struct) -> ReturnCode:
-        """Send a value without a connector; see `RtcCanopenServer.put`."""
+        """Send a value to a port without using a connector; see `RtcCanopenServer.put`."""
         for node, sink in self._sinks():
             for port in sink.ports:
                 if port.full_name == name:
@@ -112,7 +112,7 @@ class PdoDataFlow:
 
 
 class SdoDataFlow:
-    """Data flow by SDO, which reads objects for OutPorts, and writes the values of InPorts.
+    """The data flow by SDO: objects are read for OutPorts, and values of InPorts are written.
 
     Transfers happen while a proxy is Active and its device Operational. Each port with a pending
     transfer is transferred once a period at most. One job transfers all such ports of a proxy, and
@@ -147,7 +147,7 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Write a value without a connector in the next period.
+        """Write a value for a port in the next period, without using a connector.
 
         Return None if the port is unknown.
         """

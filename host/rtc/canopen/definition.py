@@ -22,7 +22,7 @@ from tickrig.wire.rtc_canopen import PortDirection
 
 
 class DefinitionError(ValueError):
-    """A System Definition that cannot be used.
+    """The System Definition cannot be used.
 
     Attributes:
         line: number of the line with the error, from 1, or 0 if the error is in no line of the
@@ -35,7 +35,7 @@ class DefinitionError(ValueError):
 
 
 class ServerRefused(ValueError):  # noqa: N818 - what the server did
-    """A command to the server that is not possible."""
+    """The server cannot execute a command."""
 
 
 # A System Definition: nodes of a bus, and what joins them (NEDO report, Fig. 108; ours: K16).
@@ -79,7 +79,7 @@ class PdoName:
 
 @dataclass(frozen=True, slots=True)
 class BusEntry:
-    """The bus in the words of python-can. A value of None leaves the choice to the command line."""
+    """The bus, as python-can names it. For a value of None, the command line decides."""
 
     channel: str | None = None
     interface: str | None = None
@@ -88,7 +88,7 @@ class BusEntry:
 
 @dataclass(frozen=True, slots=True)
 class MasterEntry:
-    """The server as a node.
+    """The server's own settings as a CANopen node.
 
     Attributes:
         node: node-ID of the server.
@@ -131,7 +131,7 @@ class PdoEntry:
 
 @dataclass(frozen=True, slots=True)
 class SdoPortEntry:
-    """A port whose object is read or written by SDO.
+    """A port for an object that is read or written by SDO.
 
     Attributes:
         index: index of the object. All elements of an array are one value.
@@ -194,7 +194,7 @@ class SdoEntry:
 
 @dataclass(frozen=True, slots=True)
 class PdoLink:
-    """A TPDO that an RPDO of another node receives without the PC."""
+    """A link by which an RPDO of one node directly receives a TPDO of another node."""
 
     source: PdoName
     target: PdoName
@@ -211,7 +211,7 @@ class RtConnection:
 
 @dataclass(frozen=True, slots=True)
 class StartEntry:
-    """The order in which nodes are activated, and whether this happens automatically.
+    """The order of activating the nodes, and whether they are activated automatically.
 
     Attributes:
         order: node-IDs in the order of activation. Nodes that are left out follow in the order of
@@ -277,14 +277,14 @@ class MappableObject:
 
 @dataclass(frozen=True, slots=True)
 class DeviceFile:
-    """A kind of device, as its EDS describes it.
+    """The description of a device type, as read from its EDS.
 
     Attributes:
         identity: values of `_IDENTITY` that the file contains.
         defaults: power-on values in the file, as bytes. The node-ID is not added.
         data_types: data types by index and sub-index.
         pdos: PDO communication parameters of the device.
-        relative: entries of `defaults` to which a device adds its node-ID.
+        relative: keys of `defaults` to whose values a device adds its node-ID.
         findings: errors in the file. Objects with errors are not used.
         mappable: objects that the PDOs of the device may carry.
     """

@@ -96,7 +96,7 @@ def many(item: _Reader) -> _Reader:
 
 
 def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
-    """Read a list whose items must differ.
+    """Return a reader of a list whose items must differ.
 
     `twice` makes the text of the error, such as `node 5 is there`.
     """
@@ -118,7 +118,7 @@ def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
 
 
 def whole(low: int, high: int) -> _Reader:
-    """Read a whole number in a range, decimal or 0x..."""
+    """Return a reader of a whole number in a range, written in decimal or as 0x..."""
 
     def read(node: Item, place: str) -> int:
         value = plain(node)
@@ -177,7 +177,7 @@ def _one_of(*words: str) -> _Reader:
 
 
 def plain(node: Item) -> Any:
-    """Return a scalar. For other nodes, return the name of their kind."""
+    """Return the value of a scalar. For a list or mapping, return what it is as a word."""
     if node.is_list:
         return "a list"
     return "a table" if node.is_mapping else node.value

@@ -80,7 +80,7 @@ EventListener = Callable[[ServerEvent], None]
 
 
 class Notify(Protocol):
-    """A function that takes an event at the present time."""
+    """A function that records an event at the present time."""
 
     def __call__(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take an event. Node 0 stands for no node."""

@@ -27,7 +27,10 @@ _Layouts = tuple[PdoLayout, ...]
 def boot_offline(
     entry: definition.NodeEntry, file: definition.DeviceFile, writes: Iterable[definition.SdoEntry]
 ) -> _Layouts | None:
-    """Return the PDOs that will be on, or None if the EDS does not contain the values."""
+    """Boot a node from its EDS alone, without a bus. Return the PDOs that will be enabled.
+
+    Return None if the EDS does not contain the needed values.
+    """
     values = dict(file.defaults)
     script = boot(entry, file, writes)
     try:
@@ -57,11 +60,11 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | 
 
 
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
-    """Return the settings that nodes on the bus will refuse, if devices match their EDS.
+    """Return the settings that the nodes will refuse, provided that they match their EDS.
 
     The result also names PDOs that several nodes send with one COB-ID, although no node refuses
-    them. Nodes whose EDS leaves values out are not checked. Components that do not exist are not
-    checked either.
+    them. Two things are not checked: nodes whose EDS lacks values, and components that do not
+    exist.
 
     Args:
         server: server that gets proxies without devices. The server cannot be used otherwise
@@ -127,7 +130,7 @@ def _connections(server: RtcCanopenServer) -> Iterator[str]:
 
 
 def draw_graph(server: RtcCanopenServer) -> str:
-    """Return the graph with connections through the PC, and with dashed PDO links.
+    """Return a graph of the system, with connections through the PC, and with dashed PDO links.
 
     Args:
         server: server that cannot be used otherwise afterwards, as after `check_offline`.

@@ -137,7 +137,7 @@ class _RestartCounter:
         self.pending = self.to_activate = self.was_active = False
 
     def lose(self, now_us: int, *, active: bool) -> None:
-        """Record that a node was lost without a request of a user."""
+        """Record that a node was lost, and that no user requested this."""
         if now_us - self._last_us >= _WELL_US:
             self._made = 0
         self.pending = True
@@ -149,23 +149,23 @@ class _RestartCounter:
         self.pending = self.to_activate = self.was_active = False
 
     def leave(self) -> None:
-        """Skip the restart if a user has already acted. A running restart continues."""
+        """Cancel a pending restart, because a user has acted. A running restart continues."""
         if self.pending:
             self.forget()
 
     def by_hand(self) -> bool:
-        """Leave the node to the user, who restarts it now.
+        """Cancel automatic restarts, because the user restarts the node.
 
-        Return whether it was lost while Active.
+        Return whether the node was lost while it was Active.
         """
         active = self.was_active or self.to_activate
         self.forget()
         return active
 
     def take(self, now_us: int) -> str:
-        """Begin a restart.
+        """Count a restart that begins now.
 
-        Return its number, such as `1 of 3`, or an empty text if none is left.
+        Return its number, such as `1 of 3`, or an empty text if no restart is left.
         """
         if self._made >= self._most:
             self.pending = False
@@ -188,7 +188,7 @@ _STATES: Final = {
 
 
 class NodeOperations:
-    """Execution of the RT side's requests on the bus, and tracking of the device state.
+    """The link between a proxy and its device: it executes requests, and tracks the device state.
 
     Args:
         entry: entry of the node.
@@ -218,7 +218,7 @@ class NodeOperations:
         return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
-        """Execute a request on the bus, unless the device is already in that state."""
+        """Execute the proxy's request on the bus, unless the device is in that state already."""
         if self.proxy is None or (requested := self.proxy.take_request()) is NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
@@ -239,7 +239,7 @@ class NodeOperations:
                 self._run("reset", self._life.reset(self._entry))
 
     def follow(self, state: NmtState, *, changed: bool) -> None:
-        """Move the proxy to the state of the device, unless that state is about to change."""
+        """Move the proxy to the state of the device, unless a request will change that state."""
         proxy = self.proxy
         if proxy is None or self._dialogue.moves or proxy.requested is not NOTHING:
             return
@@ -262,11 +262,11 @@ class NodeOperations:
         self._run("command", _say(command))
 
     def begin(self) -> None:
-        """Drop the request, because the device starts again."""
+        """Drop a pending stop request, because the device starts again."""
         self._stopping = False
 
     def booted(self) -> None:
-        """Let the proxy leave Error, because its device is Pre-operational and set up."""
+        """Record that the device is Pre-operational and set up. The proxy may then leave Error."""
         self.nmt_state, self.resetting = NmtState.PRE_OPERATIONAL, False
         if self.proxy is not None:
             self._leave_error(self.proxy)
@@ -279,12 +279,12 @@ class NodeOperations:
             self.proxy.contexts[0].abort_component(self.proxy)
 
     def lose(self) -> None:
-        """Record that the device was lost or reset without a request of a user."""
+        """Record that the device was lost or reset, and that no user requested this."""
         active = self.proxy is not None and self.proxy.state is LifeCycleState.ACTIVE
         self.restart.lose(self.now_us, active=active)
 
     def go_on(self) -> None:
-        """Reset a node that was lost and sends again, if an automatic restart is left."""
+        """Reset a lost node that sends frames again, if an automatic restart is left."""
         proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
         if proxy is None or busy or proxy.requested is not NOTHING:
             return

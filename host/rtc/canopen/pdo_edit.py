@@ -76,7 +76,10 @@ _DUMMIES: Final = tuple(
 
 
 def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.MappableObject, ...]:
-    """Return the objects that a PDO may carry, by its communication parameter. Dummies are last."""
+    """Return the objects that a PDO may carry. The dummies are last.
+
+    `index` is the index of the PDO's communication parameter.
+    """
     way = Access.TPDO if index in definition.TPDOS else Access.RPDO
     return tuple(one for one in (*file.mappable, *_DUMMIES) if way in one.way)
 
@@ -84,7 +87,7 @@ def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.Mappab
 def with_entry(
     pdo: PdoDescription, place: int, entry: MappedObject | None, *, insert: bool = False
 ) -> PdoDescription:
-    """Return a PDO with another mapping.
+    """Return a copy of a PDO in which one mapping entry is changed.
 
     Args:
         pdo: present PDO.
@@ -110,7 +113,7 @@ def with_entry(
 
 
 def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
-    """Return a PDO with another CAN-ID and its flags. Raise ValueError for an invalid CAN-ID."""
+    """Return a copy of a PDO with another COB-ID. Raise ValueError for an invalid CAN-ID."""
     text = words.strip().lower()
     try:
         number = int(text[:-1], 16) if text.endswith("h") else int(text, 0)
@@ -126,7 +129,10 @@ def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
 
 
 def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription:
-    """Return a PDO with another transmission type. Raise ValueError if CiA 301 has no such type."""
+    """Return a copy of a PDO with another transmission type.
+
+    Raise ValueError if CiA 301 has no such type.
+    """
     try:
         number = int(words, 0)
     except ValueError:
@@ -139,7 +145,10 @@ def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription
 
 
 def switched(pdo: PdoDescription) -> PdoDescription:
-    """Return a PDO switched on or off. Raise ValueError if it has no CAN-ID."""
+    """Return a copy of a PDO that is switched on if it was off, and off if it was on.
+
+    Raise ValueError if the PDO has no CAN-ID.
+    """
     if not pdo.enabled and not pdo.can_id:
         raise ValueError("the PDO has no CAN-ID: give it one first")
     return replace(pdo, cob_id=pdo.cob_id ^ INVALID)
@@ -267,13 +276,13 @@ def _difference(wanted: PdoDescription, found: PdoDescription | None) -> str:
 
 
 def pdo_name(node_id: int, index: int) -> definition.PdoName:
-    """Return the name of a PDO by its communication parameter."""
+    """Return the name of a PDO from the index of its communication parameter."""
     kind = "t" if index in definition.TPDOS else "r"
     return definition.PdoName(node_id, f"{kind}pdo{(index & 0x1FF) + 1}")
 
 
 class Rewrite:
-    """Rewriting the PDOs of a served node, which is then set up again.
+    """The task of rewriting the PDOs of a served node. The node is then set up again.
 
     Args:
         node: node to change.
@@ -301,7 +310,7 @@ class Rewrite:
         self._was_active = proxy is not None and proxy.state is LifeCycleState.ACTIVE
 
     def begin(self) -> Script[None]:
-        """Return the script.
+        """Return the script of SDO transfers that rewrites the PDOs.
 
         A node that is lost during the script has the old values at its next boot.
         """
@@ -309,7 +318,7 @@ class Rewrite:
         return self._script()
 
     def done(self) -> None:
-        """Keep the new values, and set up the node with them."""
+        """Set up the node with the new values, now and at each later boot."""
         self._keep(self._before, self._wanted)
         self._boot()
 
@@ -371,7 +380,7 @@ class _Table:
 
 
 def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
-    """Read all values of a node that a DCF contains, which are the writable parameters in its EDS.
+    """Read from a node all values that its DCF contains: the writable parameters in its EDS.
 
     Raises:
         OSError: the EDS cannot be read.

@@ -53,7 +53,7 @@ class _PortShape:
 
 
 class PdoSource:
-    """A TPDO of the device. Each frame is written to its OutPorts.
+    """A TPDO of the device. The values of each received frame are written to OutPorts.
 
     Attributes:
         layout: layout of the PDO.
@@ -70,7 +70,7 @@ class PdoSource:
         )
 
     def receive(self, now_us: int, data: bytes) -> None:
-        """Write the values in a frame. The time stamp of the values is the time of reception."""
+        """Write the values of a received frame to the OutPorts, with the time of reception."""
         tm, values = Time.from_us(now_us), self._decode(data)
         if self._single:
             (port,) = self.ports
@@ -102,7 +102,7 @@ class PdoSink:
         self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
 
     def preset(self, index: int, value: Value) -> None:
-        """Set the value that is sent for an object without a new value."""
+        """Set the value that frames carry for an object until its port gets a value."""
         for place, field in enumerate(self.layout.fields):
             if field.mapped.index == index:
                 self._latest[place] = value
@@ -113,7 +113,7 @@ class PdoSink:
             port.clear()
 
     def take(self) -> Iterator[tuple[str, Struct]]:
-        """Return all new values, each with the name of its port."""
+        """Take all new values of the InPorts, each with the name of its port."""
         for port in self.ports:
             while port.is_new:
                 value = port.read()
@@ -121,7 +121,7 @@ class PdoSink:
                 yield port.name, value
 
     def encode(self, port: str, value: Struct) -> bytes:
-        """Return the data of the frame for a value. Raise ValueError if the value does not fit."""
+        """Return the frame data for a new value. Raise ValueError if the value does not fit."""
         data: Any = getattr(value, "data", None)
         if not self._shape.single:
             latest = list(self._latest)
@@ -185,7 +185,7 @@ class _SdoPortLayout:
         return tuple(elements)
 
     def decode(self, tm: Time, elements: Sequence[bytes]) -> Struct:
-        """Return the value of the bytes of all elements.
+        """Convert the bytes of all elements to a value of the port.
 
         Raise FieldError if the bytes are invalid.
         """
@@ -201,7 +201,7 @@ class _SdoPortLayout:
             yield from download(self.index, sub, data)
 
     def encode(self, value: Struct) -> tuple[bytes, ...]:
-        """Return the bytes of each element.
+        """Convert a value of the port to the bytes of each element.
 
         Raise ValueError or TypeError if the value does not fit.
         """
@@ -235,7 +235,7 @@ class SdoSink:
         self.pending: tuple[bytes, ...] | None = None
 
     def take(self) -> Struct | None:
-        """Take the newest value, or return None without a new value."""
+        """Take the newest value of the InPort. Return None if there is no new value."""
         value = None
         while self.port.is_new:
             value = self.port.read()
@@ -304,7 +304,7 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
-    """A request of the RT side that has not been sent to the bus."""
+    """A request by the RT side that the server has not yet sent to the bus."""
 
     NOTHING = auto()
     ACTIVATE = auto()
@@ -337,9 +337,10 @@ class ProxyRtc(RtComponent):
         sdo_sources: objects of the device whose values go to OutPorts.
         sdo_sinks: objects of the device that take values from InPorts.
         requested: the request that the callbacks recorded.
-        passing: whether data from the device pass, which is True between on_activated and
-            on_deactivated.
-        confirmed: whether the device has reported Operational. Data to the device then also pass.
+        passing: whether data from the device reach the OutPorts, which is True between
+        on_activated and on_deactivated.
+        confirmed: whether the device has reported Operational. Only then are data sent to the
+        device.
         ready: whether the device can leave Error.
     """
 
@@ -377,7 +378,7 @@ class ProxyRtc(RtComponent):
 
     @property
     def state(self) -> LifeCycleState:
-        """State in the proxy's execution context, or Created if it has none."""
+        """State of the proxy in its execution context, or Created if it has no context."""
         return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
 
     def take_request(self) -> ProxyRequest:

@@ -35,7 +35,7 @@ class Joystick(RtComponent):
         self._forward_pct = self._left_pct = 0.0
 
     def tilt(self, forward_pct: float, left_pct: float = 0.0) -> None:
-        """Set the stick to -100..100 % on each axis. Larger values count as full."""
+        """Set the stick to -100..100 % on each axis. Values outside are limited to this range."""
         self._forward_pct = clip(forward_pct, _FULL_PCT)
         self._left_pct = clip(left_pct, _FULL_PCT)
 
@@ -105,7 +105,7 @@ class WheeledBase(RtComponent, ABC):
 
     @abstractmethod
     def command(self, tm: rtc.Time, left: float, right: float) -> None:
-        """Command the speed of the wheels of each side, in rad/s."""
+        """Send the wheel speed of each side to the drives, in rad/s."""
 
     @abstractmethod
     def turned(self, since_s: float) -> tuple[float, float]:
@@ -191,7 +191,7 @@ class Beego(WheeledBase):
         return _FASTEST_RPM / 60 * tau / self.gear.value
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at zero, whatever the positions of the drives are."""
+        """Set the estimated pose to zero, whatever the positions of the drives are."""
         self._counts = [None, None]
         for port in self.positions:
             port.clear()

@@ -74,7 +74,7 @@ class DuplicateNodeDetector:
         self.forget()
 
     def forget(self) -> None:
-        """Restart the detection, after frames may be missing or the producer time was written."""
+        """Restart the detection, because frames may be missing or the producer time was written."""
         self._old_us, self._steady = 0, False
         self._clear()
 
@@ -85,7 +85,7 @@ class DuplicateNodeDetector:
         self._double = _DoubleHeartbeats(self._period_us)
 
     def command(self, command: int) -> None:
-        """Process an NMT command of any master to the node."""
+        """Process an NMT command to the node, sent by any master."""
         if (state := COMMANDED.get(command)) is not None:
             self._commanded[state] = min(self._commanded[state] + 1, _CREDIT)
 
@@ -163,7 +163,7 @@ class _DoubleHeartbeats:
         self._window = self._count = self._run = 0
 
     def receive(self, at_us: int) -> bool:
-        """Process a heartbeat. Return True if there are too many heartbeats."""
+        """Count a heartbeat. Return True if there are too many for a single node."""
         if self._begin_us < 0:
             self._begin_us = at_us - self._period_us // 2
         window = (at_us - self._begin_us) // self._period_us
@@ -211,7 +211,7 @@ _LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
 
 
 class NodeServer(Protocol):
-    """The services of the server that a node needs."""
+    """The functions of the server that a node calls."""
 
     def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Record an event."""
@@ -220,7 +220,7 @@ class NodeServer(Protocol):
         """Send a frame."""
 
     def wake(self, due_us: int, /) -> None:
-        """Schedule a tick of the node at a time."""
+        """Schedule a tick of the node at `due_us`."""
 
     def booted(self, node: ServedNode, /) -> None:
         """Make the proxy if there is none, and the links and connections of the node."""
@@ -230,7 +230,7 @@ class NodeServer(Protocol):
 
 
 class ServedNode:
-    """A node, which is detected and set up, and whose proxy follows its state.
+    """A CANopen node that the server detects and sets up. Its proxy follows its NMT state.
 
     Args:
         entry: entry of the node in the System Definition.
@@ -319,7 +319,7 @@ class ServedNode:
         self.search(now_us)
 
     def refuse(self, problem: str) -> None:
-        """Leave the node as it is until it boots again."""
+        """Refuse the node for a reason, and leave it alone until it boots again."""
         self.phase, self.problem = NodePhase.REFUSED, problem
 
     def pause(self, now_us: int, span_us: int) -> None:
@@ -330,7 +330,7 @@ class ServedNode:
         self._plan()
 
     def on_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
-        """Process a boot-up or heartbeat with its time on the bus. Ignore other frames."""
+        """Process a boot-up or heartbeat frame with its time on the bus. Ignore other data."""
         try:
             (number,) = data
             state = NmtState(number)

@@ -79,7 +79,7 @@ _Table = Mapping[tuple[int, int], bytes]
 
 
 class ServerObjects:
-    """The server's own objects, and its answers to SDO reads of them.
+    """The server's own object dictionary, which answers SDO read requests.
 
     | object | what |
     |---|---|
@@ -183,7 +183,7 @@ class _FrameDispatcher:
         self._accepted = frozenset({nmt.NMT_COB_ID} | of_master | of_nodes)
 
     def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
-        """Process a data frame that was on the bus at a time."""
+        """Process a data frame that was on the bus at the time `at_us`."""
         can_id = frame.can_id
         if can_id not in self._accepted:
             return
@@ -295,10 +295,7 @@ class RtcCanopenServer:
         self._states: dict[int, LifeCycleState] = {}
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Process all frames that were on the bus by now.
-
-        Do the due work. Return frames to send.
-        """
+        """Process the received frames, do all work that is due, and return the frames to send."""
         late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
             self._start()
@@ -348,7 +345,7 @@ class RtcCanopenServer:
         self.due_us = self.now_us
 
     def put(self, name: str, value: Struct) -> ReturnCode:
-        """Send a value to a device without a connector, by the full name of an InPort.
+        """Send a value to a device through an InPort, given by its full name, without a connector.
 
         Returns:
             BAD_PARAMETER if there is no such port or the value does not fit,
@@ -358,9 +355,10 @@ class RtcCanopenServer:
         return self._data.put(name, value) if result is None else result
 
     def start(self) -> None:
-        """Activate all nodes in the start order, each when all nodes before it are Active.
+        """Activate all nodes one after the other in the start order.
 
-        A node that does not boot delays all nodes after it.
+        A node is activated when all nodes before it are Active. Therefore a node that does not boot
+        delays all nodes after it.
         """
         for node in self._start_order:
             node.to_start = True
@@ -374,7 +372,7 @@ class RtcCanopenServer:
         self._out.append(CanFrame(can_id, data))
 
     def wake(self, due_us: int, /) -> None:
-        """Tick the nodes at a time at the latest."""
+        """Tick the nodes at `due_us` at the latest."""
         self._nodes_due_us = min(self._nodes_due_us, due_us)
         self.due_us = min(self.due_us, due_us)
 

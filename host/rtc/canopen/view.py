@@ -109,7 +109,7 @@ class ComponentView:
 
 @dataclass(frozen=True, slots=True)
 class SystemView:
-    """All parts of a system at one time; see the properties of `ServerView`."""
+    """The state of a whole system at one time; see the properties of `ServerView`."""
 
     nodes: tuple[NodeView, ...]
     components: tuple[ComponentView, ...]
@@ -122,7 +122,7 @@ _T = TypeVar("_T")
 
 
 class PendingTransfer(Generic[_T]):
-    """SDO transfers with a waiting caller.
+    """The result of SDO transfers for a caller that waits.
 
     Args:
         empty: result until the transfers have ended.
@@ -147,7 +147,7 @@ class PendingTransfer(Generic[_T]):
         self.done, self.problem = True, str(failure)
 
     def drop(self) -> None:
-        """Store that the server dropped the transfers for other work."""
+        """Record that the server dropped the transfers in favour of other work."""
         self.fail("given up: the node was reset, stopped or lost")
 
 
@@ -193,7 +193,7 @@ class ServerView:
 
     @property
     def connections(self) -> tuple[RtConnection, ...]:
-        """Connections through the PC. The made connections are first."""
+        """Connections through the PC. The existing connections are first, then the pending ones."""
         return self._server.connections.all
 
     @property
@@ -242,11 +242,11 @@ class ServerView:
             self._server.manager.disconnect(first, second)
 
     def link(self, source: PdoName, target: PdoName) -> None:
-        """Let an RPDO receive a TPDO without the PC. Raise ServerRefused if they do not fit."""
+        """Make an RPDO receive a TPDO without the PC. Raise ServerRefused if they do not fit."""
         self._server.links.add(self._server.now_us, PdoLink(source, target))
 
     def unlink(self, source: PdoName, target: PdoName) -> None:
-        """End a link of an RPDO with a TPDO. Raise ServerRefused if there is none."""
+        """End the link between a TPDO and an RPDO. Raise ServerRefused if there is none."""
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
     def read(self, node_id: int, index: int, sub: int) -> PendingTransfer[bytes]:

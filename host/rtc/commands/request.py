@@ -23,7 +23,7 @@ ERROR: Final = "ERROR"
 
 
 def default_path() -> Path:
-    """Return the default address of a system, which is `tickrig-rtc` in a folder of this user."""
+    """Return the default path of a control socket: `tickrig-rtc` in a folder of this user."""
     folder = os.environ.get("XDG_RUNTIME_DIR")
     if folder:
         return Path(folder, "tickrig-rtc")
@@ -47,9 +47,9 @@ at: Final[Decorator] = click.option(
 
 
 def request_system(socket: Path, do: str, /, **fields: object) -> Any:
-    """Ask a running system and return its answer.
+    """Send a request to a running system and return its answer.
 
-    Raise Refused without an answer, or for an error.
+    Raise Refused if the system does not answer, or answers with an error.
     """
     return request(socket, SYSTEM, do, **fields)
 
@@ -86,7 +86,7 @@ complete_type: Final = _completer(lambda system: system["types"])
 
 
 def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
-    """Wait until a component is in the wanted state.
+    """Wait until a component has reached the wanted state.
 
     Args:
         socket: control socket of the system.

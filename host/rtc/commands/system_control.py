@@ -56,7 +56,9 @@ class _WatchedPort:
 
 
 class Probes:
-    """Probes that watch OutPorts and inject into InPorts, with a separate connector for each.
+    """Probes that watch the values of OutPorts, and inject values into InPorts.
+
+    Each probe has a connector of its own.
 
     The connectors belong to no component, so a saved system does not contain them. A connector
     that injects a value ends when the value was read.
@@ -112,7 +114,7 @@ class Probes:
         return value
 
     def tick(self, now_us: int) -> None:
-        """Take the written values, and end connectors that are not needed any more."""
+        """Store the values that OutPorts wrote, and end connectors that are no longer needed."""
         for port, watch in tuple(self._watches.items()):
             watch.take()
             if now_us - watch.requested_us > LEASE_US or not watch.port.connectors:
@@ -154,7 +156,7 @@ class _Runner(Protocol):
 
 
 class SystemControl(RequestDispatcher):
-    """A control that answers requests about one system. The system must not tick during a request.
+    """The control of one system, which answers requests. The system must not tick during a request.
 
     Args:
         manager: manager of the system.
@@ -186,7 +188,10 @@ class SystemControl(RequestDispatcher):
         )
 
     def saved(self, what: str) -> str:
-        """Return the system as a file. Raise ValueError unless `what` is `toml` or `xml`."""
+        """Return the system as text for a file, in the format `toml` or `xml`.
+
+        Raise ValueError for another format.
+        """
         match what:
             case "toml":
                 return write_toml(describe(self._manager))

@@ -44,7 +44,7 @@ def _component_row(component: Any) -> str:
 
 
 def component_lines(component: Any, *, long: bool) -> Iterator[str]:
-    """Return the lines of a component in `cat`.
+    """Return the lines that the command `cat` prints for a component.
 
     Args:
         component: description of the component.

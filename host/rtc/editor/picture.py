@@ -119,8 +119,8 @@ def draw(
         edges: connectors of the system. An end that belongs to no box gets a box of its own.
         columns: width of the screen in cells. A picture that would be wider has a single column of
             boxes.
-        lit: styles of highlighted boxes and ports, by name. Wires of highlighted ports have the
-            same style.
+        lit: styles of highlighted boxes and ports, by name. Wires get the styles of their
+        highlighted ports.
     """
     wires = [replace(one, source=_key(one.source), target=_key(one.target)) for one in edges]
     return _fitting(tuple(boxes), tuple(dict.fromkeys(wires)), columns).paint(lit or {})

@@ -41,7 +41,7 @@ class _Request:
 
 
 class SystemLink:
-    """A link that reads the state of a system and sends it requests, in a thread of its own.
+    """A link to a running system. Its own thread reads the state and sends requests.
 
     The connection is made again if it breaks, because the system may be restarted or replaced.
 
@@ -83,7 +83,10 @@ class SystemLink:
         return taken
 
     def turn(self) -> None:
-        """Execute all queued requests, and describe the system. The thread calls this method."""
+        """Send all queued requests, and read the state of the system.
+
+        The thread calls this method.
+        """
         while not self._requests.empty():
             if (request := self._requests.get()) is not None:
                 self._make(request)

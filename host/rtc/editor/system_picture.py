@@ -47,7 +47,7 @@ class SystemPicture(LineView):
     ]
 
     class Moved(Message):
-        """Message that another item is under the cursor."""
+        """A message: another item is under the cursor."""
 
     def __init__(self, id: str = "picture") -> None:  # noqa: A002 - Textual's name
         super().__init__(id)
@@ -79,7 +79,7 @@ class SystemPicture(LineView):
         return sorted((box.name for box in self._boxes), key=lambda name: places[name][:2])
 
     def joined(self, port: str) -> list[str]:
-        """Return the other ends of the wires of a port."""
+        """Return the ports that wires connect with a port."""
         ends = [(edge.source, edge.target) for edge in self._edges]
         return [b if a == port else a for a, b in ends if port in (a, b)]
 

@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 
 
 class CursorRow(NamedTuple, Generic[_T]):
-    """A line, and the item that it represents.
+    """A row of a list: a line of text, and the item that the line represents.
 
     Attributes:
         key: unique key of the item, which does not change while the item exists.
@@ -40,7 +40,7 @@ _MARGIN: Final = 2
 
 
 class CursorView(LineView, Generic[_T]):
-    """Rows with a cursor. The cursor stays on its item while other rows are added and removed.
+    """A list of rows with a cursor. The cursor stays on its item while other rows come and go.
 
     If the row under the cursor is cut off, its end is shown below the rows.
 
@@ -61,10 +61,10 @@ class CursorView(LineView, Generic[_T]):
     ]
 
     class Moved(Message):
-        """Message that another row is under the cursor, or that other rows are visible."""
+        """A message: another row is under the cursor, or other rows are visible."""
 
     class Entered(Message):
-        """Message that the row under the cursor was chosen.
+        """A message: the user chose the row under the cursor.
 
         Attributes:
             view: view that contains the row.
@@ -168,7 +168,7 @@ class CursorView(LineView, Generic[_T]):
 
 
 class QuestionScreen(ModalScreen[str | None]):
-    """A screen that asks for a line. The result is None without an answer.
+    """A screen that asks the user for a line of text. The result is None without an answer.
 
     Args:
         text: text of the question.
@@ -205,7 +205,7 @@ class QuestionScreen(ModalScreen[str | None]):
 
 
 class ChoiceScreen(ModalScreen[_T | None]):
-    """A screen that asks for one of several rows. Only rows with the typed text are shown.
+    """A screen that asks the user to choose a row. Only rows with the typed text are shown.
 
     The result is None without an answer.
 

@@ -27,13 +27,13 @@ def engines_joined(
     *,
     fixed: bool = False,
 ) -> Iterator[None]:
-    """Join a system with other systems until the end.
+    """Join a system with other systems by engines such as OpenRTM, until the end of the block.
 
     Args:
         options: engines to join, with their settings.
         manager: manager of the system, which is not running yet.
-        attach: function that makes calls of other threads run in the manager's thread.
-        stop: function that ends the command, if a peer requests that.
+        attach: function that makes the manager's thread run the calls in a queue.
+        stop: function that ends the command. It is called if a peer requests that.
         fixed: whether only the command may create and end components, and peers may not.
 
     Raises:

@@ -36,7 +36,7 @@ class PeerState(StrEnum):
 
 
 class PeerWatch:
-    """A record of how each call to a peer ended. A line is logged when a peer is lost or returns.
+    """A monitor of a peer, from the results of calls. It logs when the peer is lost or returns.
 
     One thread records. Any thread may read.
 
@@ -60,7 +60,7 @@ class PeerWatch:
         self.state, self.status = PeerState.CONNECTED, status
 
     def unanswered(self, error: Exception) -> None:
-        """Record that there was no answer, and the reason."""
+        """Record that a call had no answer, with the reason."""
         if self.state is PeerState.CONNECTED:
             reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
             _LOG.warning("%s: the peer does not answer: %s", self._who, reason)
@@ -77,7 +77,7 @@ _SEND_LENGTH: Final = "64"
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T, P]):
-    """A codec that converts values of a port to the form that a peer gets.
+    """A codec that converts values of a port to the form used between peers, and back.
 
     The form is bytes, or messages of an engine.
 
@@ -116,7 +116,10 @@ class PeerEnd:
 
     @property
     def options(self) -> connector.ConnectorOptions:
-        """Options in the properties. RtcRefused is raised if they are impossible."""
+        """Options of the connector, read from its properties.
+
+        RtcRefused is raised if the options are impossible.
+        """
         lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
         if lengths.isdisjoint(self.properties):
             return connector.ConnectorOptions.parse(
@@ -175,10 +178,10 @@ class _ArrivalBuffer(RingBuffer[P]):
         self._lock, self._arrived = threading.Lock(), deque[P](maxlen=options.length)
 
     def arrive(self, value: P) -> tuple[PortStatus, bool]:
-        """Add a value in any thread.
+        """Add a value, from any thread, to those that wait for the manager's thread.
 
         Returns:
-            The status that `write` would return, and whether the value is the first that waits.
+            The status that `write` would return, and whether no other value was waiting.
         """
         options = self._options
         with self._lock:
@@ -315,14 +318,14 @@ class InPortPushConnector(_InPortConnector[T, P]):
         self.buffer, self._post = _ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
-        """Put a value into the buffer, in any thread. The value can be read before the next tick.
+        """Put a value into the buffer, from any thread. It becomes readable before the next tick.
 
         This method does not wait for the manager's thread, because that would take twice as long
         as the call of an ORB itself.
 
         Returns:
-            PORT_OK, or the status of the buffer. INVALID_ARGS if the value cannot be decoded, or
-            CONNECTION_LOST after the end of the connector.
+            PORT_OK, or another status of the buffer. The result is INVALID_ARGS if the value cannot
+        be decoded, and CONNECTION_LOST after the end of the connector.
         """
         if (value := self._decoded(payload)) is None:
             return PortStatus.INVALID_ARGS
@@ -354,7 +357,10 @@ class _PulledBuffer(RingBuffer[T]):
 
     @property
     def readable(self) -> bool:
-        """Whether `read` finds a new value. If not, a value is fetched."""
+        """Whether `read` finds a new value.
+
+        If not, this property requests a value from the peer.
+        """
         found = len(self._values) > self._skip
         if not found:
             self._request()
@@ -452,8 +458,8 @@ class _InPortConsumer(Protocol[_P_contra]):
 class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     """A connector that pushes values from an OutPort to a peer, in the thread of that peer.
 
-    `write` encodes values and buffers them. It does not block. A value that the peer did not answer
-    is sent again after the thread's `retry_s`. Until then, the policy of the buffer applies.
+    `write` encodes values and buffers them. It does not block. If the peer does not answer, the
+    value is sent again after the thread's `retry_s`. Until then, the policy of the buffer applies.
 
     Args:
         port: local port of the connector.
@@ -554,11 +560,11 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         return self.buffer.write(payload)
 
     def get(self) -> tuple[PortStatus, P | None]:
-        """Take the next value, in any thread.
+        """Take the next value from the buffer, in any thread.
 
         Returns:
-            PORT_OK and the encoded value. Without a value, None with BUFFER_EMPTY, or with
-            CONNECTION_LOST after the end of the connector.
+            PORT_OK and the encoded value. If there is no value: BUFFER_EMPTY and None, or
+        CONNECTION_LOST and None after the end of the connector.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

@@ -43,7 +43,10 @@ class _DeviceWatcher:
         return min(self._next_us, now_us + POLL_US) if now_us < self._answer_us else self._next_us
 
     def tick(self) -> bool:
-        """Request the state if that is due. Return whether the device has answered."""
+        """Request the state of the device if that is due.
+
+        Return whether the device has answered.
+        """
         self._channel.poll()
         if self._channel.state is None and self._channel.now_us >= self._next_us:
             self._channel.send(LiteCommand.STATE)
@@ -60,9 +63,11 @@ _LOG: Final = log_of(__name__)
 
 @dataclass(slots=True)
 class Attachment:
-    """Upkeep of a proxy: sending PINGs, removing the proxy of a lost device, searching the device.
+    """The supervision of a proxy and its device.
 
-    The manager ticks the attachment. The attachment ends if other code deletes its proxy.
+    The attachment sends PINGs, removes the proxy of a lost device, and searches for the device if
+    the settings demand this. The manager ticks the attachment. The attachment ends if other code
+    deletes its proxy.
 
     Attributes:
         manager: manager of the system.

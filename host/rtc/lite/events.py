@@ -73,7 +73,7 @@ class PingMonitor:
 
     Attributes:
         awaiting: whether a PING waits for its answer.
-        doubted: whether a reply is missing and no PING has been answered since then.
+        doubted: whether a reply is missing, and no PING has been answered since that reply was due.
         lost: whether the device no longer answers, which is final.
     """
 
@@ -138,7 +138,7 @@ class PingMonitor:
         return self._ping(now_us)
 
     def let_go(self) -> None:
-        """Stop waiting for a routine PING, because the reply to a request proves as much."""
+        """Stop waiting for a routine PING, because a reply to a request proves the same."""
         if self.pending:
             self.awaiting = False
             self._missed += 1

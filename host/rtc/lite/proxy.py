@@ -27,7 +27,7 @@ from tickrig.wire.rtc_types.rtc import Time
 
 @dataclass(frozen=True, slots=True)
 class DeviceProfile:
-    """The profile that a device reports.
+    """The profile that an RTC-Lite device reports.
 
     Attributes:
         type_name: type of the component on the device.
@@ -128,7 +128,10 @@ class _InPortBridge:
 
     @classmethod
     def of(cls, profile: messages.LitePortProfile) -> _InPortBridge:
-        """Make the InPort of an in-port. Raise DeviceRefused if its type is unknown."""
+        """Make the proxy's InPort for a device's in-port.
+
+        Raise DeviceRefused for an unknown type.
+        """
         name, port_type = _read(profile)
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
 
@@ -158,12 +161,15 @@ class _OutPortBridge:
 
     @classmethod
     def of(cls, profile: messages.LitePortProfile) -> _OutPortBridge:
-        """Make the OutPort of an out-port. Raise DeviceRefused if its type is unknown."""
+        """Make the proxy's OutPort for a device's out-port.
+
+        Raise DeviceRefused for an unknown type.
+        """
         name, port_type = _read(profile)
         return cls(OutPort(name, _KINDS[port_type.name]), port_type)
 
     def give(self, data: bytes, now_us: int) -> None:
-        """Write a value that arrived. Raise FieldError if its type is not that of the port."""
+        """Write a received value to the OutPort. Raise FieldError if its type does not fit."""
         kind = self.port.data_type
         value = self.port_type.decode(data)
         if kind is rtc.TimedOctetSeq:
@@ -345,7 +351,7 @@ class RtcLiteProxy(RtComponent):
                 context.abort_component(self)
 
     def on_initialize(self) -> ReturnCode:
-        """Bring the device to Inactive, and make a port for each of its ports."""
+        """Bring the device to Inactive, and make a port for each port of the device."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
         self._channel = RequestChannel(self._link, self._settings)
@@ -373,7 +379,7 @@ class RtcLiteProxy(RtComponent):
         return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """Set the nearest whole rate in a device with its own timer."""
+        """If the device has its own timer, set the nearest whole rate in the device."""
         if not self._by_timer:
             return _OK
         rate_hz = min(max(1, round(ec.rate_hz)), _MAX_RATE_HZ)
@@ -409,7 +415,10 @@ class RtcLiteProxy(RtComponent):
         return self._follow()
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Let the device run on_error. If its reply was lost, move the device to Error first."""
+        """Make the device run on_error.
+
+        If a lost reply left the device Active, move it to Error first.
+        """
         self._notify_passive()
         code = self._follow()
         if self._channel.state is LiteState.ERROR and not self._by_timer:

@@ -130,7 +130,7 @@ class _FrameLink:
         return self._link.now_us
 
     def send(self, frame: LiteFrame) -> None:
-        """Send a frame. The rest of an old broken frame is no longer expected."""
+        """Send a frame. Forget an incomplete frame that was received before."""
         if self.now_us - self._byte_us >= _SILENCE_US:
             self._decoder.clear()
         self._note(">", frame)
@@ -239,7 +239,7 @@ _LOG: Final = log_of(__name__)
 
 
 class RequestChannel:
-    """The requests of a proxy, and their replies.
+    """A channel that sends the requests of a proxy, and receives the replies of the device.
 
     `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs,
     which `tick` continues without blocking. During the burst, and after a device was lost, no

@@ -25,7 +25,7 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 
 def build(project: Project) -> dict[str, str]:
-    """Return the text of each file by its name.
+    """Generate all files of a project. Return the text of each file by file name.
 
     Raises:
         ValueError: a name is not allowed in Python or C.

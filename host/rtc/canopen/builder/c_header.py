@@ -38,7 +38,7 @@ _TEMPLATE: Final = string.Template(Path(__file__).with_name("header.txt").read_t
 
 
 def write_header(profile: RtcProfile) -> str:
-    """Return the text of a header: ports, callbacks, and every object with its default."""
+    """Return the text of a C header with ports, callbacks, and every object with its default."""
     rows = list(object_table(profile))
     lower = snake_name(profile.type_name)
     upper = lower.upper()

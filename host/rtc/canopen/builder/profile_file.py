@@ -49,7 +49,7 @@ _IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport"
 
 
 def python_name(name: str) -> str:
-    """Return the name of a component's attribute. A taken name or a constant gets an underscore.
+    """Turn a name into an attribute name of a component. An underscore avoids taken names.
 
     >>> python_name("in"), python_name("target_um")
     ('in_', 'target_um')
@@ -59,12 +59,12 @@ def python_name(name: str) -> str:
 
 
 def c_name(name: str) -> str:
-    """Return the name of a member of a struct in C."""
+    """Turn a name into the name of a member of a struct in C."""
     return f"{name}_" if name in _C_KEYWORDS else name
 
 
 def snake_name(name: str) -> str:
-    """Return a name in lower case, as in names of files and constants.
+    """Turn a name into lower case with underscores, as in names of files and constants.
 
     >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
     ('unsigned_long_long', 'gripper2')
@@ -104,7 +104,7 @@ class _ProfileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """The content of a profile.
+    """The content of a profile file, from which the builder makes a component.
 
     Attributes:
         profile: the component with its ports.

@@ -45,7 +45,7 @@ _NOT_HERE: Final = ("create", "delete", "save")
 
 
 class ServerControl(SystemControl):
-    """Control of one server. It answers requests about its system, and about its nodes by node-ID.
+    """The control of one server. It answers requests about the server's system and its nodes.
 
     Args:
         server: server to control. The server must not tick during a request.
@@ -94,7 +94,7 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
-    """Make the server of a System Definition with its components.
+    """Make a server for a System Definition, with the components in files of the user.
 
     The function raises Refused if the definition or a component is not usable. Findings in EDS
     files that do not prevent use are printed to standard error.
@@ -137,7 +137,7 @@ def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
 def open_link(
     options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
 ) -> tuple[StampedLink, str]:
-    """Open the bus of a server. Return the bus, and its name as text.
+    """Open the bus of a server. Return the link to the bus, and the name of the bus.
 
     Args:
         options: the options that select the bus.
@@ -153,7 +153,7 @@ def open_link(
 
 
 def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
-    """Return the bus of the command line, or else the bus of the file."""
+    """Return the bus given on the command line. If none is given, return the bus of the file."""
     if options or entry.channel is None:
         return options
     return replace(
@@ -165,7 +165,7 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield a function that writes events to a file, if there is a file."""
+    """Yield a function that writes events to the log file, or nothing without a log file."""
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
     elif log is not None:
@@ -195,7 +195,7 @@ _QUICK_US: Final = 2_000
 
 
 def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
-    """Serve a System Definition, or check or draw it, depending on the options.
+    """Serve a System Definition. With some options, only check or draw the definition.
 
     Args:
         file: path of the System Definition.

@@ -200,7 +200,7 @@ class SystemEditor(FramedApp):
         self.picture.frame("system", self.picture.at)
 
     def on_system_picture_moved(self) -> None:
-        """Apply the keys to the item under the cursor of the picture."""
+        """Make the keys apply to the item under the cursor of the picture."""
         self.system.go_to(self.picture.at)
         self.look()
 
@@ -244,7 +244,10 @@ class SystemEditor(FramedApp):
             self.look()
 
     def action_remove(self) -> None:
-        """End the link or connection under the cursor. In the picture, end one of the port."""
+        """End the link or connection under the cursor.
+
+        In the picture, end one link or connection of the port under the cursor.
+        """
         if (row := self.system.row) is None:
             return
         if not (self.picture.display and isinstance(row.item, PortView)):

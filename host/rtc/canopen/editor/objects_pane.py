@@ -71,7 +71,7 @@ class _NodeObjects:
         return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= _FIRST_INDEX]
 
     def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
-        """Process results, and request missing values.
+        """Process results of SDO requests, and request missing values.
 
         Args:
             view: view that sends commands to the server.
@@ -92,7 +92,7 @@ class _NodeObjects:
                 self._reading[entry] = view.read(self.node_id, *entry)
 
     def read(self, entry: Entry) -> None:
-        """Read an object when it is its turn."""
+        """Queue a read of an object."""
         self._problems.pop(entry, None)
         self._wanted.append(entry)
 
@@ -233,7 +233,7 @@ class ObjectsPane(CursorView[Entry]):
         self._of: dict[int, _NodeObjects] = {}
 
     def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
-        """Show the objects of a node from now on, or none for 0. The EDS is read the first time."""
+        """Show the objects of a node, or none for node-ID 0. The EDS is read the first time."""
         if node_id and node_id not in self._of:
             self._of[node_id] = _read(node_id, eds[node_id])
         self.objects = self._of.get(node_id)

@@ -97,7 +97,7 @@ def _pdo_line(
 
 
 class PdoScreen(ModalScreen[None]):
-    """A screen that shows the PDOs of a node. Changes reach the node when they are written.
+    """A screen to edit the PDOs of a node. Changes stay on the screen until they are written.
 
     Args:
         session: session with the server.
@@ -402,7 +402,7 @@ class PdoScreen(ModalScreen[None]):
         self.app.push_screen(QuestionScreen("load the PDOs of a DCF", ""), answered)
 
     def action_leave(self) -> None:
-        """Leave the screen. Ask once if there are changes that are not written."""
+        """Leave the screen. If changes are not written, ask first."""
         if self.wanted and not self._warned:
             self._warned = True
             self._refuse(f"{len(self.wanted)} changed, not written: w writes, again leaves")

@@ -24,7 +24,9 @@ AddComponents = Callable[[RtcCanopenServer], None]
 
 
 class EditorSession:
-    """A session that runs the server of a System Definition. Each definition needs a new server.
+    """A session that runs a server in a thread, and can change to another System Definition.
+
+    Each definition gets a new server.
 
     Hold `lock` to access the server.
 
@@ -59,7 +61,7 @@ class EditorSession:
 
     @property
     def view(self) -> ServerView:
-        """View that reads the server and sends it commands."""
+        """A view of the server, to read its state and to send it commands."""
         return ServerView(self.server)
 
     @property
@@ -98,14 +100,11 @@ class EditorSession:
         self.path = path
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Pass the report of the CAN controller to the server."""
+        """Forward a report of the CAN controller to the server."""
         self.server.bus_state(state)
 
     def turn(self, until_us: int) -> None:
-        """Wait for frames or the next due time, until a time at the latest.
-
-        Then tick the server.
-        """
+        """Wait for frames or the next due time, at most until `until_us`. Then tick the server."""
         link = self._link
         due_us = min(self.server.due_us, until_us)
         now_us, received = link.receive_stamped(max(0, due_us - link.now_us))

@@ -147,7 +147,7 @@ def _joints(system: SystemView) -> Iterator[_SystemRow]:
 
 
 def boxes_and_edges(system: SystemView) -> tuple[list[Box], list[Edge]]:
-    """Return the content of a picture: nodes, components, connections, and links without the PC."""
+    """Return the boxes (nodes, components) and edges (connections, PDO links) of a picture."""
     boxes, port_of = list[Box](), dict[PdoName, str]()
     owners: tuple[_Owner, ...] = (*system.nodes, *system.components)
     for one in owners:
@@ -205,7 +205,7 @@ def link(view: ServerView, first: Item, second: Item) -> None:
 
 
 def remove(view: ServerView, item: Item) -> None:
-    """End a link or connection. Raise ServerRefused for any other key."""
+    """End a link or connection. Raise ServerRefused for any other item."""
     match item:
         case PdoLink(source, target):
             view.unlink(source, target)

@@ -23,7 +23,7 @@ _CONSTRAINTS: Final = "__constraints__"
 
 
 class ConfigurationServant:
-    """The servant of a configuration. Its methods are the operations of the IDL.
+    """The CORBA servant of a component's configuration. Its methods are the operations of the IDL.
 
     A change is checked as a whole and takes effect in the next period. Two more sets, `__widget__`
     and `__constraints__`, describe the parameters to editors. These sets cannot be changed.

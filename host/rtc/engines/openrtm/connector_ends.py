@@ -40,7 +40,7 @@ _BOTH: Final = ",".join(Endian)
 
 
 def texts(properties: _Properties) -> dict[str, str]:
-    """Return the properties that are texts or numbers. Other properties have no meaning here."""
+    """Return the properties that are texts or numbers, as texts. Others are left out."""
     found: dict[str, str] = {}
     for item in properties:
         value = item.value.value()
@@ -50,13 +50,13 @@ def texts(properties: _Properties) -> dict[str, str]:
 
 
 def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
-    """Return properties with some values changed. Other properties are unchanged."""
+    """Return a copy of properties in which some values are replaced or added."""
     kept = [item for item in properties if item.name not in values]
     return kept + nvlist(values)
 
 
 def completed(properties: _Properties) -> _Properties:
-    """Return properties of a connector, with the default byte orders if none are given."""
+    """Return properties of a connector. If there are no byte orders, add the default ones."""
     return properties if ENDIAN in texts(properties) else changed(properties, {ENDIAN: _BOTH})
 
 
@@ -89,7 +89,7 @@ def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
 
 
 def offered(port: DataPort[Any]) -> dict[str, str]:
-    """Return the properties that a data port offers to peers. rtcon compares them with a peer's."""
+    """Return the properties that a data port offers to peers. The tool rtcon compares them."""
     subscriptions = "Any" if isinstance(port, InPort) else "flush,new,periodic"
     return {
         "port.port_type": port.port_type,
@@ -105,7 +105,7 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ConnectorPlace:
-    """The environment of a connector: ORB, threads and names.
+    """The objects and names that a connector end needs: ORB, threads, port names.
 
     Attributes:
         orb: the ORB of this process.
@@ -126,7 +126,7 @@ class ConnectorPlace:
     peer: str
 
     def end(self, properties: dict[str, str]) -> peer_ports.PeerEnd:
-        """Return the peer's end with the properties that apply."""
+        """Return the settings of the connector, with the properties that apply."""
         return peer_ports.PeerEnd(self.peer, self.connector_id, properties, self.name)
 
 
@@ -215,7 +215,7 @@ _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
 
 
 class NoAnswerError(Exception):
-    """A peer is not running, hangs, or no longer has the object."""
+    """A call had no answer: the peer does not run, hangs, or no longer has the object."""
 
 
 class _Complaints:
@@ -233,7 +233,7 @@ class _Complaints:
         self._complained = False
 
     def raised(self, error: CORBA.SystemException) -> None:
-        """Process the exception of a call. Raise NoAnswerError if it is not an answer."""
+        """Process the exception of a call. Raise NoAnswerError if the peer did not answer."""
         if isinstance(error, _GONE):
             raise NoAnswerError(explain(error)) from None
         self.wrong(f"the peer answers with {type(error).__name__}")
@@ -303,7 +303,7 @@ class _Get(Protocol):
 
 
 class InPortAnswers:
-    """The operations of InPortCdr, executed by a connector."""
+    """The operations of InPortCdr, which put the values of a peer into a local InPort."""
 
     def __init__(self, connector: _Put) -> None:
         self._put, self._theirs = connector.put, _theirs()
@@ -345,8 +345,9 @@ _OUTPORT_IOR: Final = "dataport.corba_cdr.outport_ior"
 class DataEnd(ConnectorEnd):
     """The local end of a data connector.
 
-    An end that the peer calls publishes: an InPort into which the peer pushes, or an OutPort from
-    which the peer pulls. An end that calls the peer subscribes.
+    If the peer makes the calls, this end publishes an object. It is then an InPort into which the
+    peer pushes, or an OutPort from which the peer pulls. If this end makes the calls, it
+    subscribes.
 
     Args:
         place: environment of the connector.

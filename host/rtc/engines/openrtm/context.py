@@ -30,7 +30,7 @@ class _Entry:
 
 
 class ServantReferences:
-    """The components and execution contexts that peers can call, and their references.
+    """A table of the components and execution contexts that peers can call, with references.
 
     Entries are added and removed in the manager's thread. Any thread may look them up.
 
@@ -50,7 +50,7 @@ class ServantReferences:
     def enter(
         self, thing: RtComponent | ExecutionContext, interface: str, *answers: object
     ) -> Reference:
-        """Let peers call a component or execution context; see `Orb.serve`."""
+        """Make a component or execution context callable by peers; see `Orb.serve`."""
         reference = self.orb.serve(self.stubs.skeleton(interface), *answers)
         entry = _Entry(thing, reference)
         self._by_id[id(thing)] = self._by_key[self.orb.key(reference)] = entry
@@ -78,7 +78,7 @@ class ServantReferences:
         return None if entry is None else entry.thing
 
     def code(self, code: ReturnCode) -> Any:
-        """Return a return code in the type of the stubs."""
+        """Convert a return code to the type that the stubs use."""
         return self.stubs.rtc.ReturnCode_t._item(int(code))
 
 
@@ -103,7 +103,7 @@ def _calling(name: str) -> Callable[[AttachedContexts, int], Any]:
 
 
 class AttachedContexts:
-    """The execution contexts of a component, for peers. Its methods are operations of the IDL.
+    """The IDL operations on the execution contexts of a component, local ones and those of peers.
 
     A peer attaches an execution context of its own, and then calls `on_activated`, `on_execute` and
     so on with the handle that it received. The callback gets this context with the time of the
@@ -134,7 +134,7 @@ class AttachedContexts:
         return self._calls.call(lambda: [*self._references.all_of(self._others()), *peers])
 
     def get_context(self, exec_handle: int) -> Reference:
-        """Return the context of a handle, or nil if there is none."""
+        """Return the context that has a handle, or nil if there is none."""
         return self._calls.call(lambda: self._by_handle().get(exec_handle))
 
     def get_context_handle(self, cxt: Reference) -> int:
@@ -230,13 +230,15 @@ def move(
     request: Request,
     timeout_us: int = CALL_TIMEOUT_US,
 ) -> ReturnCode:
-    """Request a move and wait for its end. Call this in any thread but that of the manager.
+    """Request a state change of a component and wait for its end.
+
+    Do not call this function in the manager's thread.
 
     Args:
         calls: queue that runs calls in the manager's thread.
         context: execution context of the component.
         component: component that takes part in the context.
-        request: method that requests the move: `ExecutionContext.activate_component`,
+        request: method that requests the change: `ExecutionContext.activate_component`,
             `deactivate_component` or `reset_component`.
         timeout_us: time to wait, first for the manager's thread, then for the end.
 
@@ -246,7 +248,7 @@ def move(
         or did not reach the requested state in time.
 
     Raises:
-        TimeoutError: the manager's thread had no time. The move was then not requested.
+        TimeoutError: the manager's thread had no time. The change was then not requested.
         RtcRefused: the system has ended.
     """
     wanted, future = _WANTED[request], Future[ReturnCode]()
@@ -278,7 +280,7 @@ INTERFACE = "RTC.ExecutionContextService"
 
 
 class ExecutionContextServant:
-    """An execution context, for peers. Its methods are the operations of the IDL.
+    """The CORBA servant of an execution context. Its methods are the operations of the IDL.
 
     Activating, deactivating and resetting wait for the new state up to 1 s, as in OpenRTM.
     Components of other processes cannot join the context. Such requests return UNSUPPORTED.

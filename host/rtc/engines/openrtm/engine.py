@@ -174,7 +174,7 @@ def openrtm_joined(
     *,
     fixed: bool,
 ) -> Iterator[None]:
-    """Let the components of a manager join a system of OpenRTM; see `_OpenRtmEngine`."""
+    """Join the components of a manager to an OpenRTM system; see `_OpenRtmEngine`."""
     engine = _OpenRtmEngine(options, rtcs, calls, stop, fixed=fixed)
     try:
         yield

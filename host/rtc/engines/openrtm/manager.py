@@ -30,7 +30,7 @@ _RATE: Final = "exec_cxt.periodic.rate"
 
 
 class ManagerServant:
-    """The servant of a manager. Its methods are the operations of the IDL.
+    """The CORBA servant of a manager. Its methods are the operations of the IDL.
 
     The servant creates and deletes components of the types that its process knows, and ends the
     process. Operations on modules, other managers and settings are not supported. Such operations

@@ -25,7 +25,7 @@ _LOG: Final = log_of(__name__)
 
 
 class NameServer:
-    """A client that keeps names bound in a name server. Its own thread does the waiting.
+    """A client that keeps names bound in a name server. It waits for the server in its own thread.
 
     All names are bound again every 10 s, and also as soon as a name server answers again after it
     did not answer. Both events are logged.
@@ -37,7 +37,7 @@ class NameServer:
         look_us: retry interval while the name server does not answer.
 
     Attributes:
-        answers: whether the name server accepted the latest names.
+        answers: whether the name server accepted the names at the last attempt.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ def _make_contexts(root: Any, name: list[Any]) -> None:
 
 
 def name_of(path: str) -> list[Any]:
-    """Return a path in the form of the name service, with ID, and kind after the last dot."""
+    """Convert a path to a CORBA name. In each part, the text after the last dot is the kind."""
     parts = (part.rpartition(".") for part in path.split("/"))
     return [
         CosNaming.NameComponent(*((id_, kind) if dot else (kind, ""))) for id_, dot, kind in parts

@@ -179,7 +179,7 @@ def nvlist(values: Mapping[str, str]) -> list[Any]:
 
 
 def carried(name: str, text: str) -> str:
-    """Return a text in the form that a CORBA string can carry. The log names the text."""
+    """Replace the characters that a CORBA string cannot carry. If there are any, log the text."""
     sent = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
     if sent != text:
         _LOG.warning(
@@ -189,7 +189,7 @@ def carried(name: str, text: str) -> str:
 
 
 def explain(error: Exception) -> str:
-    """Return the reason in a few words why a call had no answer."""
+    """Explain in a few words why a call had no answer."""
     text = str(error)
     found = (words for mark, words in _REASONS.items() if mark in text.lower())
     return next(found, text or type(error).__name__)

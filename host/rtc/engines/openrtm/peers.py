@@ -34,11 +34,11 @@ _USUAL: Final = {
 
 
 class Peers:
-    """Upkeep of the connectors of a system to components that run elsewhere.
+    """A monitor that makes and renews connectors to components of other processes.
 
-    Each connector is checked once a second, in its own thread. A connector that cannot be made is
-    tried again. A connector whose peer restarted is made again. A connector that was ended while
-    the peer ran is not made again.
+    Each connector is checked once a second, in its own thread. A connector that could
+    not be made, or whose peer restarted, is made again. A connector that was ended while the peer
+    ran is not made again.
 
     Args:
         ports: ports of the system.
@@ -164,7 +164,7 @@ def refuse_wrong_paths(manager: Manager) -> None:
 
 
 def parse_path(path: str) -> tuple[Endpoint, str]:
-    """Read a path in the notation of rtshell, with a name server, and a name in this server.
+    """Split a path in the notation of rtshell into the name server and the name in this server.
 
     >>> parse_path("localhost:2809/robot.host_cxt/Joystick0.rtc")
     (Endpoint(host='localhost', port=2809), 'robot.host_cxt/Joystick0.rtc')

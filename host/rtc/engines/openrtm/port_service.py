@@ -188,7 +188,9 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connector with an ID, and whether it exists or has just ended.
+        """Return the connection to a peer by its ID, or None, and whether the ID is known.
+
+        The ID is known if the connector exists, or has just ended.
 
         After this call, the peer of the connector need not be notified of the end.
         """
@@ -198,7 +200,7 @@ class _PeerConnections:
         return connection, known or self._port.find_connector(connector_id) is not None
 
     def profiles(self) -> list[_Profile]:
-        """Return the connectors of the port, without those of probes."""
+        """Return the profiles of the port's connectors, without those of probes."""
         found = (self._describe(connector) for connector in self._port.connectors)
         return [profile for profile in found if profile is not None]
 
@@ -436,7 +438,7 @@ _POLL_US: Final = 10_000
 
 
 class SystemPorts:
-    """All ports of a system that peers see.
+    """All ports of a system that peers can connect.
 
     Args:
         orb: the ORB of this process.
@@ -519,7 +521,7 @@ class SystemPorts:
 
 
 class ComponentPorts:
-    """The ports of a component, which are served while the component lives.
+    """The ports of one component, which peers can connect while the component lives.
 
     Args:
         system: all ports of the system.

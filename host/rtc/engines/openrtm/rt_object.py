@@ -26,7 +26,7 @@ class _Ports(Protocol):
 
 
 class RtObjectServant:
-    """The servant of a component. Its methods are the operations of the IDL.
+    """The CORBA servant of a component. Its methods are the operations of the IDL.
 
     Not emulated: organizations and composite components, whose lists are empty, and services that
     peers add.

@@ -68,7 +68,7 @@ class Stubs:
 
 @cache
 def stubs() -> Stubs:
-    """Import the stubs. The first time on a machine they are compiled, which takes 0.5 s.
+    """Import the stubs of Tickrig's IDL. On a machine's first import they are compiled, in 0.5 s.
 
     Raises:
         RtcRefused: omniORB is not installed, or the stubs cannot be made.

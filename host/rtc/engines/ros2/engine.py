@@ -110,7 +110,7 @@ _LOG: Final = log_of(__name__)
 
 @contextmanager
 def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
-    """Join the ports of a system with topics, including ports of components added later.
+    """Connect the ports of a system with ROS 2 topics, including ports of components added later.
 
     Raises:
         OSError: the table cannot be read.
@@ -202,7 +202,7 @@ class _Ros2Engine:
         self._in.submit(self._foreign.look)
 
     def join(self, component: RtComponent) -> None:
-        """Join the ports of a component. Log failures in one line."""
+        """Connect the ports of a component with topics. Log failures in one line."""
         name = component.instance_name
         entries = self._table.entries
         if entries is None:

@@ -25,11 +25,11 @@ _ASTRAY_NS: Final = 10_000_000_000
 
 
 class Stamps:
-    """A converter between the time of a system and the time of the machine.
+    """A converter between times of a system and time stamps of ROS messages.
 
     Values with equal times get equal stamps, for example a pose and its transform. A value whose
-    time differs by more than 1 s from the time of the system gets the current time. Values that a
-    late system writes have the time at which they were due.
+    time differs by more than 1 s from the time of the system gets the current time. If a system is
+    late, its values have the times at which they were due.
 
     Args:
         now_us: function that returns the time of the system.
@@ -45,7 +45,7 @@ class Stamps:
         self._start_ns = self._clock() - 1_000 * self._now_us()
 
     def to_ros(self, tm: Time) -> tuple[int, int]:
-        """Return the stamp of a value, in seconds and nanoseconds."""
+        """Return the time stamp for a value of the system, in seconds and nanoseconds."""
         now_us, tm_us = self._now_us(), tm.us
         if not -_FAR_US <= tm_us - now_us <= _FAR_US:
             tm_us = now_us
@@ -54,7 +54,10 @@ class Stamps:
         return divmod(self._start_ns + 1_000 * tm_us, 1_000_000_000)
 
     def to_system(self, sec: int = 0, nanosec: int = 0) -> Time:
-        """Return the time of a message with this stamp, or the present time without a stamp."""
+        """Convert a message's time stamp to a time of the system.
+
+        Without a stamp, use the present time.
+        """
         now_us = self._now_us()
         at_us = (sec * 1_000_000_000 + nanosec - self._start_ns) // 1_000
         if not -_FAR_US <= at_us - now_us <= _FAR_US:

@@ -112,7 +112,7 @@ _PEERS: Final = (
 
 
 class DdsParticipant:
-    """A participant in a DDS domain until it is closed.
+    """A participant in a DDS domain, which makes the writers and readers of topics.
 
     Args:
         domain: number of the domain, 0..232.
@@ -181,7 +181,7 @@ def _qos_of(entry: TopicEntry) -> Qos:
 
 
 def reason_of(error: DDSException) -> str:
-    """Return the reason of a DDS error without the names in its code."""
+    """Return the reason of a DDS error as text, without names from the code of DDS."""
     return str(error).partition("]")[2].strip() or str(error)
 
 
@@ -233,7 +233,7 @@ _Endpoints = Mapping[str, OwnEndpoint]
 
 
 class ForeignEndpoints:
-    """A log of peers that cannot be joined with a local topic. Each gets a line with the reason.
+    """A log of peers whose writers or readers do not fit a local topic, with the reasons.
 
     Args:
         participant: participant in the domain.

@@ -22,9 +22,9 @@ _STRAIGHT: Final = 1e-9
 
 
 def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes an Odometry of poses.
+    """Return a function that converts a pose to an Odometry message.
 
-    The velocity is that since the previous pose.
+    The velocity in the message is computed from the previous pose.
     """
     make, speed = _odometry(entry, stamps), _Speed()
 
@@ -36,7 +36,7 @@ def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes an Odometry of poses with their velocities."""
+    """Return a function that converts a pose with its velocity to an Odometry message."""
     make = _odometry(entry, stamps)
 
     def convert(value: Any) -> Any:
@@ -47,7 +47,7 @@ def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a TFMessage with one transform of a pose."""
+    """Return a function that converts a pose to a TFMessage with one transform."""
     header, vector, turned = _header(entry, stamps), _vector(), _turned()
     stamped = message_type("geometry_msgs/msg/TransformStamped")
     transform, message = message_type("geometry_msgs/msg/Transform"), message_type(entry.type)
@@ -61,13 +61,13 @@ def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a PoseStamped of a pose."""
+    """Return a function that converts a pose to a PoseStamped message."""
     header, pose, message = _header(entry, stamps), _pose(), message_type(entry.type)
     return lambda value: message(header(value.tm), pose(value.data))
 
 
 def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return a function that makes a pose of a PoseStamped. A tilt is left out."""
+    """Return a function that converts a PoseStamped to a pose in the plane, without the tilt."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
         def convert(message: Any) -> Any:
@@ -83,13 +83,13 @@ def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], An
 
 
 def twist_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a Twist of a velocity in the plane."""
+    """Return a function that converts a velocity in the plane to a Twist message."""
     twist = _twist()
     return lambda value: twist(value.data.vx, value.data.vy, value.data.va)
 
 
 def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a TwistStamped of a velocity in the plane."""
+    """Return a function that converts a velocity in the plane to a TwistStamped message."""
     header, twist, message = _header(entry, stamps), _twist(), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -100,7 +100,7 @@ def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]
 
 
 def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return a function that makes a velocity in the plane of a Twist or TwistStamped."""
+    """Return a function that converts a Twist or TwistStamped to a velocity in the plane."""
 
     def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
         stamped = entry.type.endswith("Stamped")
@@ -116,7 +116,7 @@ def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], A
 
 
 def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a JointState of positions."""
+    """Return a function that converts positions of joints to a JointState message."""
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -128,7 +128,7 @@ def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a JointState of the state of actuators."""
+    """Return a function that converts the state of actuators to a JointState message."""
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: Any) -> Any:
@@ -140,7 +140,10 @@ def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def scan_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that makes a LaserScan. A missing distance is infinite (REP 117)."""
+    """Return a function that converts distances to a LaserScan.
+
+    Missing ones are infinite (REP 117).
+    """
     header, message = _header(entry, stamps), message_type(entry.type)
 
     def convert(value: RangeData) -> Any:
@@ -162,7 +165,7 @@ class _Speed:
         self._before: tuple[Time, Pose2D] | None = None
 
     def since(self, tm: Time, pose: Pose2D) -> tuple[float, float]:
-        """Return m/s ahead and rad/s since the previous pose, or 0 for the first pose."""
+        """Return the velocity since the previous pose, in m/s ahead and rad/s. The first is 0."""
         before, self._before = self._before, (tm, pose)
         if before is None or (past_us := tm.us - before[0].us) <= 0:
             return 0.0, 0.0

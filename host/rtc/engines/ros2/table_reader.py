@@ -98,7 +98,7 @@ _DIAGNOSTICS: Final[Schema] = {
 
 
 def parse_table(text: str, name: str) -> topic_entry.TopicTable:
-    """Return the table in the text of a file.
+    """Parse a table of ports and topics.
 
     Args:
         text: text of the whole file.

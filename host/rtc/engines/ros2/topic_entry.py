@@ -22,7 +22,7 @@ FRAMES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class TopicEntry:
-    """A port and its topic.
+    """An entry of the table of topics: a port, its topic, and the settings for the messages.
 
     Attributes:
         port: full name of the port, such as `Odometry.OdometryPosition`.
@@ -53,7 +53,7 @@ class TopicEntry:
 
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return an entry with the default frames and stop time if it has none."""
+    """Return an entry for a message type, with the type's default frames and stop time."""
     stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")
