@@ -63,10 +63,10 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
 
 
 class PortStatus(IntEnum):
-    """Result of a write (OpenRTM-aist 1.x, DataPortStatus), without codes that never occur here.
+    """The result of an operation of a data port (OpenRTM-aist 1.x, DataPortStatus).
 
-    Only ports that are connected with ports of peers give PORT_ERROR, BUFFER_EMPTY and
-    CONNECTION_LOST.
+    Codes that never occur here are left out. Only ports that are connected with ports of peers
+    return PORT_ERROR, BUFFER_EMPTY and CONNECTION_LOST.
     """
 
     PORT_OK = 0

@@ -34,9 +34,9 @@ _WIDE: Final = {"dataport.buffer.length": "64"}
 
 
 class MotionChain:
-    """The six components in one execution context, in the order in which data flow.
+    """The six components that control a cart, in one execution context in the order of data flow.
 
-    Any other order also works, but delays data by periods.
+    In another order they would also work, but data would be delayed by periods.
 
     Args:
         manager: manager that runs the components.
@@ -88,7 +88,7 @@ class MotionChain:
         return self._in(LifeCycleState.ERROR)
 
     def use(self, set_id: str) -> None:
-        """Activate the configuration set with a name in all components that have it."""
+        """Activate a configuration set, given by its ID, in all components that have it."""
         for component in self.components:
             if set_id in component.configuration.sets:
                 component.configuration.activate(set_id)
@@ -98,7 +98,10 @@ class MotionChain:
         self.manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
-        """Request Inactive of the Active components. A component on its way to Error refuses."""
+        """Request the move to Inactive of all Active components.
+
+        One on its way to Error refuses.
+        """
         for component in self.components:
             self.context.deactivate_component(component)
 

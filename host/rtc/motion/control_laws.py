@@ -24,7 +24,7 @@ _ETA: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class VelocityLimits:
-    """The limits of a command.
+    """The limits for velocity commands.
 
     Attributes:
         v: maximum forward velocity in m/s.
@@ -39,7 +39,7 @@ class VelocityLimits:
     dw: float
 
     def smooth(self, wanted: Twist, before: Twist) -> Twist:
-        """Return the command that is nearest to the wanted velocity."""
+        """Return the allowed command that is nearest to the wanted velocity."""
         v, w = clip(wanted.v, self.v), clip(wanted.w, self.w)
         return Twist(before.v + clip(v - before.v, self.dv), before.w + clip(w - before.w, self.dw))
 
@@ -47,13 +47,13 @@ class VelocityLimits:
 def steps(
     max_acc_v: float, max_acc_w: float, tick_s: float, acc_cycle_s: float
 ) -> tuple[float, float]:
-    """Return the steps that `max_acc_*` allow in a tick. The limits are given for `acc_cycle_s`."""
+    """Return the velocity changes allowed in one tick. `max_acc_*` are those for `acc_cycle_s`."""
     share = tick_s / acc_cycle_s
     return max_acc_v * share, min(max_acc_w * share, _MOST_ANGULAR_ACCELERATION * tick_s)
 
 
 class ControlLaw(StrEnum):
-    """Integration of the angular velocity from one command to the next."""
+    """The integration method of the regulator for the angular velocity."""
 
     IMPLICIT = "implicit"  # stable for any step; the designed dynamics
     EXPLICIT = "explicit"  # as it was: a limit cycle where step times K3 is above 2
@@ -68,8 +68,8 @@ class Regulator:
         k2: gain in rad/s2 per radian of deviation q from the heading of the line.
         k3: gain in 1/s for the angular velocity.
         most_offset: largest distance from the line that counts, in m.
-        c1: speed in m/s by which the cart is slower per rad/s. The explicit law does not use it.
-        step_s: time from one command to the next in the law.
+        c1: reduction of the speed in m/s per rad/s of turning. The explicit law does not use `c1`.
+        step_s: time from one command to the next, used by the law.
         law: integration method, implicit or explicit.
     """
 
@@ -82,13 +82,13 @@ class Regulator:
     law: ControlLaw = ControlLaw.IMPLICIT
 
     def follow_line(self, line: Pose, pose: Pose, v: float, before: Twist) -> Twist:
-        """Return the command along a line at a speed, positive or negative."""
+        """Return the command that steers to a line, at a positive or negative speed."""
         return self._steer(line.left(pose), wrap(pose.heading - line.heading), v, before)
 
     def follow_circle(
         self, centre: Pose, radius: float, pose: Pose, v: float, before: Twist
     ) -> Twist:
-        """Return the command round a circle, which is to the left for a positive radius."""
+        """Return the command that steers round a circle, to the left for a positive radius."""
         rho = hypot(pose.x - centre.x, pose.y - centre.y)
         phi = atan2(pose.y - centre.y, pose.x - centre.x)
         turn = copysign(1.0, radius)
@@ -109,7 +109,7 @@ class Regulator:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSpin:
-    """The spin of the reference hardware's follower.
+    """The control law for turning on the spot, as in the reference hardware.
 
     Attributes:
         alpha: angular acceleration in rad/s2.
@@ -126,7 +126,9 @@ class ReferenceSpin:
 
 @dataclass(frozen=True, slots=True)
 class TimeOptimalSpin:
-    """A spin that brakes as late as possible, for the angle at the time of its effect.
+    """A control law for turning on the spot that brakes as late as possible.
+
+    The law uses the angle at the time at which the command takes effect.
 
     Attributes:
         alpha: angular acceleration in rad/s2.

@@ -112,7 +112,10 @@ def _sample(connection: BaseConnection, time_s: float) -> TrackSample:
 
 
 def set_latency(chain: MotionChain, response_s: float) -> None:
-    """Tune the set `tuned` to a base by its time constant in s, and one and a half periods."""
+    """Set `latency` in the configuration set `tuned`, from the time constant of the base in s.
+
+    The latency is the time constant plus one and a half periods.
+    """
     latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
     for component in (chain.navigation, chain.path_follower):
         component.configuration.set("latency", latency, "tuned")

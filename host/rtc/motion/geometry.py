@@ -14,11 +14,11 @@ class Pose(NamedTuple):
     heading: float = 0.0
 
     def along(self, point: Pose) -> float:
-        """Return the distance of a point ahead, along the line through this pose."""
+        """Return how far a point is ahead, measured along the line through this pose."""
         return (point.x - self.x) * cos(self.heading) + (point.y - self.y) * sin(self.heading)
 
     def left(self, point: Pose) -> float:
-        """Return the distance of a point to the left of the line through this pose."""
+        """Return how far a point is to the left of the line through this pose."""
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 
     def distance(self, point: Pose) -> float:
@@ -38,7 +38,7 @@ class Twist(NamedTuple):
 
 
 def wrap(angle: float) -> float:
-    """Return an angle in -pi..pi. Half a turn is pi.
+    """Wrap an angle to the range -pi..pi. Half a turn is pi, not -pi.
 
     >>> wrap(3 * pi) == wrap(-pi) == pi
     True
@@ -48,7 +48,7 @@ def wrap(angle: float) -> float:
 
 
 def positive(angle: float) -> float:
-    """Return an angle in 0..2 pi, as the IIS interfaces recommend."""
+    """Wrap an angle to the range 0..2 pi, as the IIS interfaces recommend."""
     return angle % tau
 
 

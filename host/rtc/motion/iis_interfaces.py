@@ -49,7 +49,7 @@ class _Adapter(RtComponent, Generic[S, T]):
 
 
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
-    """An adapter from a moving command of phase 1 to a robot of phase 2."""
+    """An adapter that converts moving commands of phase 1 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
 
@@ -59,7 +59,10 @@ class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
 
 
 class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
-    """An adapter from a moving command of phase 2 to a robot of phase 1 without sideways motion."""
+    """An adapter that converts moving commands of phase 2 for a robot of phase 1.
+
+    The robot has no sideways motion.
+    """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To1", "IIS velocity, phase 2 to 1")
 
@@ -69,7 +72,7 @@ class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
 
 
 class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
-    """An adapter from a moving command of phase 2 to a robot of phase 3."""
+    """An adapter that converts moving commands of phase 2 for a robot of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To3", "IIS velocity, phase 2 to 3")
 
@@ -80,7 +83,7 @@ class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
 
 
 class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
-    """An adapter from a moving command of phase 3 to a robot of phase 2."""
+    """An adapter that converts moving commands of phase 3 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity3To2", "IIS velocity, phase 3 to 2")
 
@@ -91,7 +94,7 @@ class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
 
 
 class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
-    """An adapter from a self-position of phase 2 to phase 3."""
+    """An adapter that converts self-positions of phase 2 to phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
@@ -104,7 +107,7 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
 
 class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
-    """An adapter from a self-position of phase 3, or of RH3, to phase 2."""
+    """An adapter that converts self-positions of phase 3, or of RH3, to phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
@@ -117,7 +120,7 @@ class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
 
 
 class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """An adapter from a pose of RH3 to an IIS interface, with the heading in 0..2 pi."""
+    """An adapter that converts poses of RH3 for an IIS interface, with the heading in 0..2 pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositiveHeading", "Heading in 0..2 pi")
 
@@ -130,7 +133,7 @@ class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
 
 class WrappedHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """An adapter from a pose of an IIS interface to RH3, with the heading in -pi..pi."""
+    """An adapter that converts poses of an IIS interface for RH3, with the heading in -pi..pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("WrappedHeading", "Heading in -pi..pi")
 
@@ -209,7 +212,9 @@ class RunningInformation(RtComponent):
 
 
 class GoalInterface(RtComponent):
-    """A component for goals of IIS. The first pose counts, and an empty list clears the goal.
+    """A component that accepts goals by the IIS interface.
+
+    The first pose of a list is the goal. An empty list clears the goal.
 
     A new goal replaces the old goal. A cleared goal becomes an empty path, so the cart stops on the
     spot, as IIS recommends. A goal with an invalid number is ignored. Join `position` with
@@ -310,7 +315,7 @@ class PathInterface(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take the newest list, and judge a new pose."""
+        """Read the newest list, and check for a new pose which way points were passed."""
         now = Time.from_us(ec.now_us)
         if (path := ports.read_newest(self.path)) is not None:
             self._take(now, path)

@@ -18,7 +18,7 @@ _CODES: Final = {code.value: code for code in modbus.ExceptionCode}
 
 @dataclass(frozen=True, slots=True)
 class ModbusAnswer:
-    """The answer of a slave.
+    """The answer of a Modbus slave.
 
     Attributes:
         request: request that was answered.
@@ -32,13 +32,13 @@ class ModbusAnswer:
 
 
 class ModbusMaster:
-    """A master that sends requests to one slave. One request is under way at a time.
+    """A Modbus master that sends requests to one slave, one request at a time.
 
-    On a line with echo, the master skips its own frames. A late answer is taken for the answer to
-    the next request, if it has the same form.
+    On a line with echo, the master skips its own frames. A late answer counts as the answer
+    to the next request, if it has the same form.
 
     pymodbus and minimalmodbus wait on the machine's clock and cannot wait on the clock of a rig.
-    Therefore this master is an own implementation, with the codec of the slave. The tests of the
+    Therefore this class implements the master, with the codec of the slave. The tests of the
     slave use those libraries.
 
     Args:

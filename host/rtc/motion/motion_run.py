@@ -43,7 +43,7 @@ class _CrossTrack(NamedTuple):
 
 @dataclass(slots=True)
 class MotionRun:
-    """A way from a pose to a goal.
+    """The record of a motion from a pose to a goal.
 
     Attributes:
         goal: wanted end of the path.
@@ -83,7 +83,7 @@ class MotionRun:
 
     @property
     def cross_track(self) -> _CrossTrack:
-        """Distance of the cart from its long legs."""
+        """Distance of the cart from the long lines of its path."""
         errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
             0.0
         ]
@@ -123,7 +123,7 @@ class MotionLimits:
 
 
 def way_time_s(way: float, speed: float, acceleration: float) -> float:
-    """Return the time of a straight motion from rest to rest.
+    """Return the time of a straight motion that starts and ends at rest.
 
     >>> way_time_s(3.0, 0.3, 0.3), way_time_s(0.3, 1.0, 0.3)
     (11.0, 2.0)
@@ -134,7 +134,7 @@ def way_time_s(way: float, speed: float, acceleration: float) -> float:
 
 
 def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> float:
-    """Return the least time along a list of `omni_to_2wd.plan`.
+    """Return the shortest time for a list of poses made by `omni_to_2wd.plan`.
 
     >>> round(least_time_s([Pose(), Pose(), Pose(3.0), Pose(3.0, 0.0, 0.3)]), 2)
     12.06
@@ -161,7 +161,9 @@ _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 class TrackMap:
-    """A map of goals and a track on the largest scale that fits. x is to the right, y is up.
+    """A text map of goals and a cart's track, on the largest scale that fits.
+
+    On the map, x is to the right, and y is up.
 
     Args:
         points: points that the map must contain.
@@ -207,7 +209,7 @@ class TrackMap:
 
 
 class LiveMap:
-    """A map that takes each sample. Below the map is a line of numbers.
+    """A map that is drawn again while samples arrive, with a line of numbers below.
 
     Args:
         track: map that is drawn.
@@ -219,7 +221,7 @@ class LiveMap:
         self._count = self._height = 0
 
     def watch(self, sample: TrackSample) -> None:
-        """Take a sample. Draw the map if that is due."""
+        """Add a sample. Draw the map if that is due."""
         self._track.add(sample.pose)
         if self._count % _DRAW_EVERY == 0:
             self._draw(sample)

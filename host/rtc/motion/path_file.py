@@ -57,7 +57,7 @@ def in_degrees(numbers: Sequence[float], text: str) -> Pose:
 
     Args:
         numbers: numbers as text.
-        text: text that represents the numbers in a message.
+        text: text of the numbers, used in messages.
 
     Raises:
         ValueError: there are not two or three numbers, a number is invalid, or the pose is beyond
@@ -72,7 +72,7 @@ def in_degrees(numbers: Sequence[float], text: str) -> Pose:
 
 
 def describe_pose(pose: Pose) -> str:
-    """Return a pose as text, in metres and degrees."""
+    """Describe a pose in metres and degrees."""
     return f"{pose.x:.3f} {pose.y:.3f} m, {degrees(pose.heading):.1f} deg"
 
 

@@ -66,7 +66,10 @@ def plausible(*numbers: float) -> bool:
 
 
 def to_pose(data: Pose2D) -> Pose | None:
-    """Return a pose with its heading in -pi..pi, or None if a number is not `plausible`."""
+    """Convert a pose of a port, with the heading in -pi..pi.
+
+    Return None unless it is `plausible`.
+    """
     x, y, heading = data.position.x, data.position.y, data.heading
     return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
 
@@ -85,5 +88,5 @@ def write_velocity(
 
 
 def to_pose_2d(pose: Pose) -> Pose2D:
-    """Return a pose in the type that ports carry."""
+    """Convert a pose to the type that ports carry."""
     return Pose2D(Point2D(pose.x, pose.y), pose.heading)

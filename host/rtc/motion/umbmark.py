@@ -22,7 +22,7 @@ Error = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Umbmark:
-    """The errors at the end of squares.
+    """The result of a UMBmark test: the errors of a cart's odometry after driving squares.
 
     Attributes:
         clockwise: error of each run in clockwise direction.
@@ -36,7 +36,7 @@ class Umbmark:
 
     @property
     def most_m(self) -> float:
-        """E_max,syst, which is the larger distance of the two centres of gravity."""
+        """E_max,syst: the larger of the distances of the two centres of gravity from the origin."""
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 
     def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
@@ -64,7 +64,7 @@ def _centre(errors: Sequence[Error]) -> Error:
 
 
 def square(*, clockwise: bool, side_m: float = SIDE_M) -> list[Pose]:
-    """Return the corners of a square from the origin back to it."""
+    """Return the corners of a square that starts and ends at the origin."""
     y = -side_m if clockwise else side_m
     return [Pose(side_m), Pose(side_m, y), Pose(0.0, y), Pose()]
 

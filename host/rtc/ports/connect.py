@@ -22,7 +22,7 @@ def connect(
     name: str = "",
     connector_id: str = "",
 ) -> ConnectorBase:
-    """Connect an OutPort and an InPort, or two service ports. The order does not matter.
+    """Connect an OutPort with an InPort, or two service ports, in any order.
 
     Args:
         first: first port.

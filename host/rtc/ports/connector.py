@@ -22,7 +22,7 @@ V = TypeVar("V")
 
 
 class InterfaceType(StrEnum):
-    """The way in which a value passes the connector (`interface_type`)."""
+    """How a connector transfers values (`interface_type`)."""
 
     DIRECT = "direct"  # the value itself
     CORBA_CDR = "corba_cdr"  # its bytes, encoded and decoded again
@@ -36,7 +36,7 @@ class DataflowType(StrEnum):
 
 
 class SubscriptionType(StrEnum):
-    """The time at which values are pushed (`subscription_type`)."""
+    """When a connector pushes values (`subscription_type`)."""
 
     FLUSH = "flush"  # while they are written
     NEW = "new"  # at the end of the tick in which they were written
@@ -54,7 +54,7 @@ class _PushPolicy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ConnectorOptions:
-    """The options in the properties of a connector."""
+    """The options of a connector, read from its properties."""
 
     interface: InterfaceType
     dataflow: DataflowType
@@ -77,9 +77,10 @@ class ConnectorOptions:
 
     @classmethod
     def parse(cls, properties: Mapping[str, str]) -> ConnectorOptions:
-        """Read properties. Missing properties have OpenRTM's defaults, and `direct`.
+        """Read the options in the properties of a connector.
 
-        Keys that are not in this table are kept and have no effect.
+        Missing properties have OpenRTM's defaults, but `interface_type` is `direct`. Keys that are
+        not in this table are kept and have no effect.
 
         | key, after `dataport.` | values |
         |---|---|
@@ -193,17 +194,20 @@ class _Publisher(Generic[T]):
 
     @property
     def due_us(self) -> int:
-        """Time at which `take` has work to do: in the past for a new value, `NEVER` without one."""
+        """Time at which `take` has values to push.
+
+        The time is in the past for a new value, or `NEVER` without a value.
+        """
         if not len(self._values):
             return NEVER
         return 0 if self._planned_us == NEVER else self._planned_us
 
     def write(self, value: T) -> PortStatus:
-        """Hold a value, according to the policies of the OutPort's buffer."""
+        """Put a value into the OutPort's buffer, according to the policies of the buffer."""
         return self._values.write(value)
 
     def take(self, now_us: int) -> tuple[T, ...]:
-        """Take the values that are pushed at `now_us`."""
+        """Remove and return the values that are to be pushed at `now_us`."""
         late_us = now_us % self._period_us
         taken = () if late_us and now_us < self._planned_us else self._pick()
         waits = len(self._values) > 0
@@ -256,16 +260,19 @@ class Connector(ConnectorBase, Generic[T]):
 
     @property
     def publishes(self) -> bool:
-        """Whether values are pushed in `tick`, later than they are written."""
+        """Whether `tick` pushes the values, instead of `write`."""
         return self._publisher is not None
 
     @property
     def due_us(self) -> int:
-        """Time at which `tick` has values to push: in the past for a new value, or `NEVER`."""
+        """Time at which `tick` has values to push.
+
+        The time is in the past for a new value, or `NEVER` without a value.
+        """
         return self._publisher.due_us if self._publisher else NEVER
 
     def write(self, value: T) -> PortStatus:
-        """Take a value from the OutPort.
+        """Accept a value from the OutPort.
 
         Returns:
             The status of the buffer that gets the value, such as PORT_OK. With `corba_cdr`,

@@ -27,7 +27,7 @@ _OFFERED: Final[Mapping[str, str]] = {
 
 
 class DataPort(Port[Connector[T]], Generic[T]):
-    """A port for values of one type.
+    """A port that transfers values of one type.
 
     Args:
         name: name of the port, without the name of its component.
@@ -45,8 +45,8 @@ class DataPort(Port[Connector[T]], Generic[T]):
 class OutPort(DataPort[T]):
     """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
 
-    Each connector takes each value, and moves the value according to its `dataport.*` properties
-    (`ConnectorOptions.parse`).
+    Each connector gets each value, and transfers the value according to its `dataport.*`
+    properties (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
 
@@ -69,9 +69,9 @@ class OutPort(DataPort[T]):
                 connectors with `corba_cdr`.
 
         Returns:
-            PORT_OK if all connectors took the value, or if there are no connectors. Otherwise the
-            status of the first connector that did not: BUFFER_FULL, BUFFER_TIMEOUT or INVALID_ARGS.
-            PORT_ERROR if the write exceeds a limit of the node.
+            PORT_OK if all connectors accepted the value, or if there are no connectors. Otherwise
+        the status of the first connector that did not: BUFFER_FULL, BUFFER_TIMEOUT or
+        INVALID_ARGS. The result is PORT_ERROR if the write exceeds a limit of the node.
 
         Raises:
             TypeError: the value has another type.
@@ -121,8 +121,8 @@ class InPort(DataPort[T]):
         """Take the next value from the first buffer that has one, without waiting.
 
         Returns:
-            The next value. If there is no new value, the value of the last read again. None if
-            there was no read yet, or the connector's `empty_policy` is not `readback`.
+            The next value. If there is no new value, the result is the value of the last read, or
+        None if nothing was read yet or the connector's `empty_policy` is not `readback`.
         """
         for connector in self.connectors:
             if connector.buffer.readable:

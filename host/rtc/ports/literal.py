@@ -27,7 +27,7 @@ S = TypeVar("S", bound=Struct)
 
 
 def literal(value: object) -> object:
-    """Return a value in a form for `json.dumps`. Octets are numbers, and enumerators are names."""
+    """Convert a value for `json.dumps`. Octets become numbers, and enumerators become names."""
     match value:
         case Struct():
             return {name: literal(getattr(value, name)) for name in value.__match_args__}
@@ -40,7 +40,7 @@ def literal(value: object) -> object:
 
 
 def read_literal(kind: type[S], given: object, now_us: int) -> S:
-    """Return the struct that a JSON value represents. Missing fields have their default.
+    """Convert a JSON value to a struct. Missing fields have their default.
 
     Args:
         kind: type of the struct.

@@ -11,7 +11,7 @@ from tickrig.host.rtc.listeners import call_listeners
 
 @dataclass(frozen=True, slots=True)
 class ConnectorProfile:
-    """A connector as OpenRTM describes it.
+    """The profile of a connector, as in OpenRTM.
 
     Attributes:
         name: name of the connector, for display.
@@ -28,7 +28,7 @@ class ConnectorProfile:
 
 
 def automatic_id(ports: tuple[str, str]) -> str:
-    """Return the ID of a connector whose caller gave none. Equal runs have equal IDs."""
+    """Make the ID of a connector from the names of its ports. Equal runs have equal IDs."""
     return "_".join(ports)
 
 
@@ -49,7 +49,7 @@ class InterfaceProfile:
 
 @dataclass(frozen=True, slots=True)
 class PortProfile:
-    """A port as OpenRTM describes it.
+    """The profile of a port, as in OpenRTM.
 
     Attributes:
         name: full name, such as `ConsoleIn0.out`.
@@ -72,8 +72,8 @@ class ConnectorBase:
 
     Attributes:
         profile: profile of the connector.
-        ports: local ports of `profile.ports`, which are both, or the one that is connected with a
-            peer's port.
+        ports: local ports of the connector: both ports, or a single one if the other port belongs
+        to a peer.
         joined: whether the connector is joined, which is True between `begin` and `end`.
     """
 
@@ -87,7 +87,7 @@ class ConnectorBase:
 
     @property
     def joins_components(self) -> bool:
-        """Whether both ports are local ports of components.
+        """Whether both ports belong to local components.
 
         Ports of probes belong to no component.
         """
@@ -124,15 +124,15 @@ class PortGuard(Protocol):
     """A guard that keeps a port within the limits of its node."""
 
     def admit(self, connector: ConnectorBase, /) -> None:
-        """Raise RtcRefused unless the port may have this additional connector."""
+        """Raise RtcRefused if the port may not have this additional connector."""
 
     def passes(self, port: AnyPort, value: Any, /) -> bool:
-        """Return whether a value may leave through a port, or arrive at it from a peer."""
+        """Return whether a port may send a value, or receive a value from a peer."""
         ...
 
 
 class Port(Generic[C]):
-    """A named end of connectors.
+    """A port of a component, which is connected by connectors.
 
     Args:
         name: name of the port, without the name of its component.

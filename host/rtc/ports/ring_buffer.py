@@ -36,7 +36,7 @@ class EmptyPolicy(StrEnum):
 
 
 class ReadPolicy(StrEnum):
-    """The waiting value that is read. Values before it are dropped (`buffer.read.policy`)."""
+    """Which of the waiting values is read (`buffer.read.policy`). Older values are dropped."""
 
     FIFO = "fifo"
     LAST = "last"
@@ -102,11 +102,11 @@ class RingBuffer(Generic[T]):
         return len(self._values) > self._skip
 
     def write(self, value: T) -> PortStatus:
-        """Add a value at the end.
+        """Add a value at the end of the buffer.
 
         Returns:
-            PORT_OK, also when the oldest value was overwritten. If the buffer is full: BUFFER_FULL
-            with `do_nothing`, BUFFER_TIMEOUT with `block`.
+            PORT_OK, also if the oldest value was overwritten. If the buffer is full, the result is
+        BUFFER_FULL with `do_nothing`, and BUFFER_TIMEOUT with `block`.
         """
         values, options = self._values, self._options
         if len(values) == options.length and options.full is not FullPolicy.OVERWRITE:
@@ -121,8 +121,8 @@ class RingBuffer(Generic[T]):
         """Take a value.
 
         Returns:
-            The value. If there is no new value: with `readback` the value that was read last,
-            otherwise None.
+            The value. If there is no new value, the result is the value that was read last with
+        `readback`, otherwise None.
         """
         values, skip = self._values, self._skip
         if len(values) <= skip:

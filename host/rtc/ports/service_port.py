@@ -25,10 +25,10 @@ class Provider(Generic[T]):
 
 
 class Consumer(Generic[T]):
-    """An interface that a port calls, such as `Consumer[RefHard]("refhard", "RefHard")`.
+    """An interface that a port requires, such as `Consumer[RefHard]("refhard", "RefHard")`.
 
-    Calls are plain method calls. They return before anything else runs, and an exception of the
-    provider is raised in the caller.
+    Calls are plain method calls, without another thread. An exception of the provider is raised in
+    the caller.
     """
 
     def __init__(self, instance_name: str, type_name: str) -> None:
@@ -44,7 +44,7 @@ class Consumer(Generic[T]):
     def service(self) -> T:
         """The provider's servant.
 
-        RtcRefused (PRECONDITION_NOT_MET) is raised without a provider.
+        RtcRefused (PRECONDITION_NOT_MET) is raised if there is no provider.
         """
         if self._provider is None:
             message = f"{self.profile.instance_name} is not connected"
@@ -52,7 +52,7 @@ class Consumer(Generic[T]):
         return self._provider.servant
 
     def take(self, provider: Provider[T] | None) -> None:
-        """Use this provider from now on. None removes the present provider."""
+        """Set the provider of the interface. None removes the present provider."""
         self._provider = provider
 
 
@@ -60,7 +60,7 @@ _Interface = Provider[Any] | Consumer[Any]
 
 
 class ServicePort(port.Port["ServiceConnector"]):
-    """A port with interfaces, which are provided or required."""
+    """A port with interfaces that the component provides to others, or requires from others."""
 
     port_type = "CorbaPort"
 
@@ -85,7 +85,7 @@ class ServicePort(port.Port["ServiceConnector"]):
 
 
 class ServiceConnector(port.ConnectorBase):
-    """A connector that gives the consumers of each port the providers of the other port."""
+    """A connector of two service ports, which gives each port's consumers the other's providers."""
 
     def __init__(
         self,

@@ -26,7 +26,7 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 
 
 class CallQueue:
-    """A queue of calls from any thread. The manager's thread makes the calls between its ticks.
+    """A queue of calls from other threads, which the manager's thread executes between its ticks.
 
     A `ServingClock` calls `serve` while it waits. If this thread also serves a control socket,
     `LineServer.attach(queue, queue.make)` serves both.
@@ -153,13 +153,13 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 
 
 class Arrivals:
-    """Calls that are executed at the beginning of the next tick, as an item of a schedule.
+    """A schedule item for received values: calls that are executed at the start of the next tick.
 
     No code reads a value before the next tick, so values need not wake the manager's thread.
     Waking it for each value would take three times the processor time.
 
     Attributes:
-        due_us: due time, always `NEVER`, because the calls do not make a tick earlier.
+        due_us: due time, which is always `NEVER`, because the calls wait for a tick of other items.
     """
 
     due_us: Final = NEVER

@@ -23,13 +23,13 @@ _SPECIAL: Final = re.compile(r'([\\{}|<>" ])')
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A component.
+    """A component, drawn as a box.
 
     Attributes:
-        title: text below its name.
-        ins: names of the ports at its left.
-        outs: names of the other ports, at the right.
-        state: state of its life cycle, such as `ACTIVE`.
+        title: text below the name of the component.
+        ins: names of the ports at the left of the box.
+        outs: names of the other ports, at the right of the box.
+        state: life-cycle state of the component, such as `ACTIVE`.
     """
 
     name: str
@@ -64,12 +64,12 @@ def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
 
 
 def system_graph(components: Iterable[Any]) -> str:
-    """Return the graph of a system whose components have the descriptions of a control socket."""
+    """Return the graph of a system, from the component descriptions that a control socket gives."""
     return write_dot(*boxes_and_edges(components))
 
 
 def boxes_and_edges(components: Iterable[Any]) -> tuple[list[Box], list[Edge]]:
-    """Return the boxes and edges of a system with the descriptions of a control socket."""
+    """Return the boxes and edges of a system, from the descriptions that a control socket gives."""
     described = tuple(components)
     ends = dict.fromkeys(
         tuple(connector["ports"])

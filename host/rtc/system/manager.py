@@ -96,7 +96,7 @@ def _installed_type(name: str) -> type[RtComponent]:
 
 @dataclass(frozen=True, slots=True)
 class RemoteEntry:
-    """A component that runs elsewhere.
+    """An entry for a component that runs in another process.
 
     Attributes:
         name: name of the component in the system, such as `Joystick0` in `Joystick0.out`.
@@ -110,7 +110,7 @@ class RemoteEntry:
 
 @dataclass(frozen=True, slots=True)
 class RemoteConnection:
-    """A connector of a local port with a port of a component that runs elsewhere.
+    """A connector between a local port and a port of a component in another process.
 
     Attributes:
         port: full name of the local port.
@@ -143,7 +143,7 @@ class Remotes:
 
 
 class NameService:
-    """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
+    """A table of components by path, as rtshell writes paths: `localhost/ConsoleIn0.rtc`.
 
     These names exist only in this process. Not emulated: a CORBA naming service for other
     processes.

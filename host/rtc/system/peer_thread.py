@@ -35,7 +35,7 @@ class _CallingThread(threading.Thread):
 
 
 def calls_run() -> bool:
-    """Return whether a thread that should end is still in a call.
+    """Return whether a thread that should end still executes a call.
 
     A process that ends during a call may abort or hang, because the call is in C++ code.
     """
@@ -69,7 +69,7 @@ class PeerThread:
         self._calls.put(call)
 
     def close(self, wait_us: int = 0) -> None:
-        """End the thread after the present call. Wait for that, at most `wait_us`."""
+        """End the thread after the present call. Wait for the end, at most `wait_us`."""
         self._thread.ending = True
         self._calls.put(None)
         self._thread.join(wait_us / 1e6)
@@ -131,8 +131,8 @@ class PeerCaller(Protocol):
 class PeerThreads:
     """Threads that make the calls of many connectors. Each connector makes one call at a time.
 
-    As long as peers answer at once, there is one thread. It takes a third of the processor time
-    that a thread for each connector would take. If calls wait, a second thread is started, and one
+    As long as peers answer at once, there is one thread. This takes a third of the processor time
+    of one thread for each connector. If calls wait, a second thread is started, and one
     more for each call that hangs.
 
     Args:

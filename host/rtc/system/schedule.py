@@ -10,7 +10,7 @@ from tickrig.host.rtc.ports.connector import Connector
 
 
 class ScheduledItem(Protocol):
-    """An object that a schedule ticks in addition to execution contexts and connectors."""
+    """An additional object that a schedule ticks, besides execution contexts and connectors."""
 
     @property
     def due_us(self) -> int:
@@ -22,7 +22,7 @@ class ScheduledItem(Protocol):
 
 
 class Schedule:
-    """A schedule that executes due items. It has no clock, so `tick` takes the time.
+    """A schedule that runs the items that are due. It has no clock: `tick` gets the time.
 
     A tick has four steps: other items run, then the execution contexts run in the order in which
     they were added, then connectors push, then deferred calls run. In virtual time, `run_to` ticks.
@@ -56,8 +56,8 @@ class Schedule:
         Args:
             now_us: current time, which is never less than before.
 
-        A caller that skips a `due_us` skips its periods, because each execution context runs one
-        period at most.
+        Each execution context runs one period at most in a tick. Therefore call `tick` at each
+        `due_us`; otherwise periods are skipped.
         """
         self.now_us, self._ticking = now_us, True
         for item in self._items:
@@ -70,7 +70,7 @@ class Schedule:
             self._deferred.pop(0)()
 
     def run_to(self, t_us: int) -> None:
-        """Run all items that are due until a time, including that time, without waiting.
+        """Run all items that are due up to and including a time, in virtual time without waiting.
 
         Args:
             t_us: time until which items run.
@@ -82,7 +82,7 @@ class Schedule:
         self.tick(t_us)
 
     def run_for(self, duration_us: int) -> None:
-        """Run all items that are due in the following time, without waiting.
+        """Run all items that are due in the next `duration_us`, in virtual time without waiting.
 
         Args:
             duration_us: length of the time in us.
@@ -121,7 +121,7 @@ class Schedule:
         self._items = tuple(other for other in self._items if other is not item)
 
     def add_connector(self, connector: Connector[Any]) -> None:
-        """Make a connector push from now on, if it pushes later than values are written."""
+        """Tick a connector from now on, if it pushes its values in ticks."""
         self._publishing = [other for other in self._publishing if other.joined]
         if connector.publishes:
             self._publishing.append(connector)
@@ -148,7 +148,7 @@ class Clock(Protocol):
 
 
 class RealTime:
-    """A runner of a schedule by a clock. Late periods are caught up, and no period is skipped.
+    """A runner of a schedule in real time. Late periods are caught up, and no period is skipped.
 
     Late periods run one after the other, each with the time at which it was due. If a system always
     takes longer than its periods, its delay grows, as `worst_late_us` shows.

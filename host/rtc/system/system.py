@@ -22,7 +22,7 @@ _Sets = Mapping[str, Mapping[str, str]]
 
 @dataclass(frozen=True, slots=True)
 class ComponentEntry:
-    """A component of a system.
+    """The description of a component of a system.
 
     Attributes:
         name: instance name of the component.
@@ -48,7 +48,7 @@ class ComponentEntry:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionEntry:
-    """A connector of a system, by the full names of its ports.
+    """The description of a connector of a system, by the full names of its ports.
 
     Attributes:
         ports: full names of both ports, with the providing port first.
@@ -65,7 +65,7 @@ class ConnectionEntry:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """All components and connectors of a system, in the order in which they are made.
+    """The description of a system: its components and connectors, in the order of making them.
 
     Not saved: values in ports and buffers, and the internal state of components.
 
@@ -113,9 +113,10 @@ def restore(manager: Manager, system: System) -> None:
 
 
 def with_remotes(system: System, types: Container[str]) -> System:
-    """Return a system whose components of unknown types are remote, if they have a path.
+    """Return a copy of a system in which components of unknown types are remote.
 
-    The RTSProfile of a system that several processes run has such components.
+    Only components with a path become remote. The RTSProfile of a system that several processes
+    run has such components.
 
     Args:
         system: system that was read.
@@ -147,7 +148,7 @@ def _connection(profile: ConnectorProfile) -> ConnectionEntry:
 
 
 def given_id(connector_id: str, ports: tuple[str, str]) -> str:
-    """Return the ID of a connector, empty if it is the default ID."""
+    """Return the ID of a connector, or an empty text if it is the default ID."""
     return "" if connector_id == automatic_id(ports) else connector_id
 
 
@@ -233,7 +234,10 @@ def _configure(component: RtComponent, entry: ComponentEntry) -> None:
 
 
 def differences(wanted: System, found: System) -> Iterator[str]:
-    """Yield a line for each difference. Additional parts of the system do not matter."""
+    """Yield a line for each part of the wanted system that is missing or different.
+
+    Additional parts of the found system do not matter.
+    """
     there = {entry.name: entry for entry in found.components}
     for entry in wanted.components:
         if entry.name not in there:

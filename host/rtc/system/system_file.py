@@ -185,7 +185,7 @@ def read_system(path: Path) -> System:
 
 
 def lacking(path: Path, text: str) -> tuple[str, ...]:
-    """Return a line for each part of a file that a system lacks.
+    """Compare a system with a file. Return a line for each part of the file that the system lacks.
 
     Args:
         path: path of the file in TOML or XML.
@@ -217,7 +217,7 @@ def file_format(path: Path) -> str:
 
 
 def check_system(path: Path) -> None:
-    """Check before a run whether a system can be written after it. Raise Refused if not."""
+    """Check before a run that a system can be written after the run. Raise Refused if not."""
     file_format(path)
     try:
         check_file(path, "system")

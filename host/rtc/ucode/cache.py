@@ -35,7 +35,7 @@ class Fetched:
 
 
 class Source(Protocol):
-    """A source of texts by address that does not block. Each request ends, at least by a time-out.
+    """A non-blocking source of texts by address. Each request ends, at least by a time-out.
 
     In real time, the source is an HTTP client in its own thread. In virtual time, it is a table
     with a delay.
@@ -61,7 +61,7 @@ _V = TypeVar("_V")
 
 @dataclass(frozen=True, slots=True)
 class CacheLimits:
-    """Size of a cache, and life times of its entries.
+    """The size of a cache, and the life times of its entries.
 
     Attributes:
         entries: maximum number of entries. The least recently used entry is removed first.
@@ -101,7 +101,7 @@ class _CacheCounts:
 
     @property
     def total(self) -> int:
-        """Sum of look-ups and failed requests, which shows whether the numbers have changed."""
+        """Sum of look-ups and failed requests. If the sum is unchanged, no number has changed."""
         return self.hits + self.misses + self.failures
 
 
@@ -141,7 +141,10 @@ class LookupCache(Generic[_V]):
         return sum(entry.value is not None for entry in self._entries.values())
 
     def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> _V | None:
-        """Return the value at an address, or None. The address may be requested."""
+        """Return the value at an address, or None if there is none.
+
+        Request the address if needed.
+        """
         entry = self._entries.setdefault(address, _Entry())
         self._entries.move_to_end(address)
         if not entry.pending and now_us >= entry.next_us and self._pending < limits.entries:
@@ -153,7 +156,7 @@ class LookupCache(Generic[_V]):
         return self._answer(entry, limits, now_us)
 
     def update(self, source: Source, limits: CacheLimits, now_us: int) -> tuple[str, ...]:
-        """Process results of the source. Return the addresses that have a value now."""
+        """Process results of the source. Return the addresses that now have a value."""
         ended = source.take(now_us)
         self._pending -= len(ended)
         return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))

@@ -22,11 +22,11 @@ _MOST_CHARACTERS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """The information about a place.
+    """The information about the place of a ucode marker.
 
     Attributes:
         x_m: x coordinate of the place.
-        y_m: y coordinate of the place, to the left of x.
+        y_m: y coordinate of the place. The y axis points to the left of the x axis.
         properties: texts `name=value` of the properties, in the order of the names.
     """
 
@@ -36,7 +36,7 @@ class Contents:
 
 
 class ContentsInterpretation(Lookup[Contents]):
-    """A component that reads the information about places, which is position and properties.
+    """A component that looks up the position and the properties of places.
 
     The ports are:
 

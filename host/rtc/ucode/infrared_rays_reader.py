@@ -26,7 +26,7 @@ _SILENCE_US: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """The data of a reader in one round.
+    """The data that an infrared reader sends for one round.
 
     Attributes:
         number: number of the round in the counter of the reader, 0..65535.
@@ -41,7 +41,7 @@ class Round:
 
 
 class UcodeReaderClient:
-    """A client that starts a reader, and receives its rounds.
+    """A client of an infrared reader, which starts the reader and receives its rounds.
 
     A round with a lost or garbled line is left out. After each second without a valid line, the
     reader is started again. Data that were on the line before the start are dropped, because the
@@ -127,7 +127,7 @@ OPEN_SERIAL: Final[_OpenReader] = partial(SerialLink, baud=BAUD)
 
 
 class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
-    """A component that runs a reader while it is Active, and writes the ucodes of each round.
+    """A component that runs an infrared reader while Active, and writes the ucodes of each round.
 
     The ports are `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was
     received) and `levels` of their signals in per cent. A reader that does not send is started

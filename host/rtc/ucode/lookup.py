@@ -31,7 +31,7 @@ class WantedUcode(NamedTuple):
 
 
 class Lookup(RtComponent, Generic[_V]):
-    """A component that looks up each arriving ucode in its cache, or else in a service.
+    """A component that looks up each arriving ucode in its cache, and if needed in a service.
 
     Periods do not wait for the service. A result that arrives in a later period is written in that
     period, with the time at which the ucode arrived. An entry older than `fresh` is requested

@@ -20,7 +20,7 @@ _MOST_CHARACTERS: Final = 1_000
 
 
 class UcodeSettlement(Lookup[str]):
-    """A component that resolves ucodes to the addresses of their information, at a service.
+    """A component that asks a service for the address of the information about each ucode.
 
     The ports are `ucodes` in, and `addresses` out, which alternates a ucode and its address. The
     service has the address as text under `SERVICE/ucodes/UCODE`. Invalid ucodes are counted in

@@ -26,7 +26,7 @@ _TUNED = {
 
 
 class Navigation(RtComponent):
-    """The state machine of the reference hardware's navigation (rh3-control, state machine).
+    """The navigation of the reference hardware, a state machine (rh3-control, state machine).
 
     The state machine is evaluated once for each new pose. The parameters after `max_vel` are
     additions. Their defaults are the constants of the reference hardware. With `braking` above 0,
@@ -72,7 +72,7 @@ class Navigation(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take a new list, judge a new pose, and write the state."""
+        """Read a new list of points, evaluate a new pose, and write the state."""
         now = Time.from_us(ec.now_us)
         if (way := ports.read_newest(self.min_path)) is not None:
             self._start(now, way)

@@ -17,9 +17,10 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 
 
 class Odometry(RtComponent):
-    """A component that integrates the wheel motion on exact arcs, for the middle of the drive axle.
+    """A component that computes the pose of the middle of the drive axle from the wheel angles.
 
-    The port LocalizedPosition exists and is unused, as in the specification. A message is ignored
+    The motion is integrated on exact arcs. The port LocalizedPosition exists and is unused, as in
+    the specification. A message is ignored
     if its angles are not numbers, or if it has fewer angles than there are ids of wheels.
 
     Attributes:
@@ -61,7 +62,7 @@ class Odometry(RtComponent):
             self.configuration.add_set(set_id, {**held, **values})
 
     def calibrate(self, wheels: Wheels) -> None:
-        """Set radii and axle. Raise RtcRefused if a length is not above 0."""
+        """Set wheel radii and axle length. Raise RtcRefused if a length is not above 0."""
         for parameter, value in zip(self._geometry, wheels, strict=True):
             self.configuration.set(parameter.name, repr(value))
 
@@ -83,7 +84,7 @@ class Odometry(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Add the rotation of the wheels since the last angles."""
+        """Update the pose by the rotation of the wheels since the last angles."""
         for sample in read_all(self.angles):
             self._add(sample)
         return ReturnCode.RTC_OK

@@ -20,11 +20,11 @@ _LOG: Final = log_of(__name__)
 
 
 class OmniTo2WD(RtComponent):
-    """A planner for a cart that cannot go sideways. It never goes backward.
+    """A planner of turns and straight lines, for a cart that cannot go sideways.
 
-    A step of zero length is left out. A goal or a path with an invalid number is ignored, and a
-    line is logged. FINISH is written only once, when the goal is reached, so that the end of an
-    earlier command is not taken for the end of a later command.
+    The cart never goes backward. A step of zero length is left out. A goal or a path with an
+    invalid number is ignored, and a line is logged. FINISH is written only once, when the goal is
+    reached, so that the end of an earlier command is not taken for the end of a later command.
 
     Attributes:
         refused: number of ignored goals and paths.

@@ -19,9 +19,9 @@ _TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
 
 
 class PathFollower(RtComponent):
-    """A follower that runs one mode until the next message (rh3-control, control laws).
+    """A component that commands the velocity of a cart along a path (rh3-control, control laws).
 
-    The modes are:
+    Each message sets a mode, which runs until the next message. The modes are:
 
     - free and stop, both towards standstill
     - line, to-point, and circle (centre x, y, radius r, to the left if positive)
@@ -107,7 +107,7 @@ class PathFollower(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take one message, make a step of its mode, and command the velocity."""
+        """Read one message, compute the next command in the mode, and write the velocity."""
         if self.target_path.is_new and (path := self.target_path.read()) is not None:
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
             self.path = path if plausible(*numbers) else Path(RunMode.STOP)

@@ -27,7 +27,7 @@ USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
 
 
 class PositionInput(RtComponent):
-    """A component that sends one command after the other.
+    """A component that sends the user's goals and paths, one command after the other.
 
     Each command waits until the previous command has finished.
 
@@ -119,7 +119,7 @@ class PositionInput(RtComponent):
                 raise ValueError(f"{line!r} is not a command: {USAGE}")
 
     def require_open(self) -> None:
-        """Raise ValueError if `end` was called and the component was not reset since."""
+        """Raise ValueError if `end` was called, and the component was not reset after that."""
         if self._ending:
             raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
 

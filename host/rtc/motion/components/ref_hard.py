@@ -72,7 +72,7 @@ class RefHardRh3(RtComponent):
     period. Therefore it does not wait, and a command is on the line in the period in which it was
     made.
 
-    The component goes to Error in these cases, in which the base then stops by its own watchdog:
+    The component goes to Error in these cases. The base then stops by its own watchdog:
 
     - the base has a fault
     - the base refuses, or does not answer, `_MAX_MISSES` requests in a row
@@ -144,7 +144,7 @@ class RefHardRh3(RtComponent):
         self._stopped = True
 
     def Go(self) -> None:  # noqa: N802
-        """Let the velocity at the port apply again."""
+        """Apply the velocity at the port again, after `Stop`."""
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -174,7 +174,7 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Stop the base on its ramp, and release the line."""
+        """Stop the base by its own ramp, and close the line."""
         if self._master is not None:
             try:
                 if self._identified:

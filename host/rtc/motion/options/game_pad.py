@@ -85,9 +85,10 @@ def open_pad(name: str) -> _GamePadDevice:
 
 
 class GamePad(DeviceComponent[_GamePadDevice]):
-    """A component that writes a velocity in each period while a stick is deflected, then 0 once.
+    """A component that writes the velocity of a game pad in each period while a stick is deflected.
 
-    The specification has only the name of the component. Ports and parameters are additions.
+    After the release of the stick, it writes 0 once. The specification has only the name of the
+    component. Ports and parameters are additions.
 
     Args:
         instance_name: name of the component.

@@ -14,7 +14,7 @@ from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
 
 class LrfCaptureUrg(DeviceComponent[UrgClient]):
-    """A component that makes a sensor measure while it is Active, and writes each scan.
+    """A component that runs a laser scanner while the component is Active, and writes each scan.
 
     A range of 0 means that there was no distance. The specification has only the name of the
     component (LRFCapture_URG). Ports and parameters are additions.
@@ -35,7 +35,7 @@ class LrfCaptureUrg(DeviceComponent[UrgClient]):
         self._open_link = open_link
 
     def open_client(self) -> UrgClient:
-        """Open the line, and make the sensor measure."""
+        """Open the line, and start the measurement."""
         return UrgClient(self._open_link(self.device.value), self.cluster.value)
 
     def exchange(self, ec: ExecutionContext, client: UrgClient) -> None:

@@ -35,7 +35,7 @@ _LOG: Final = log_of(__name__)
 
 
 class UrgToObstacles(RtComponent):
-    """A component that writes the places of obstacles in the frame of the robot.
+    """A component that writes the positions of obstacles in the coordinates of the robot.
 
     x is ahead of the axle, and y is to the left. The specification has only the name of the
     component (Urg_to_Obstacles). Ports and parameters are additions.
@@ -116,12 +116,12 @@ class _WatchedDistance:
         self._port, self.free, self._received_us = port, False, 0
 
     def forget(self) -> None:
-        """Reset the lane to blocked, and the time of the last distance."""
+        """Forget the last distance. The lane then counts as blocked."""
         self._port.clear()
         self.free, self._received_us = False, 0
 
     def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
-        """Take the newest distance. Return whether the lane is free."""
+        """Read the newest distance. Return whether the lane is free."""
         latest = read_newest(self._port)
         if latest is not None and plausible(latest.data):
             self._received_us = ec.now_us
@@ -132,7 +132,7 @@ class _WatchedDistance:
 
 
 class ObstaclesAvoidance(RtComponent):
-    """A component between PathFollower and base that stops the cart before obstacles.
+    """A component that stops the cart before obstacles. It is between PathFollower and the base.
 
     The component plans no way around. Forward motion ends when an obstacle is nearer than
     `stop_distance`, and continues when it is farther than `go_distance`. Both use `max_acc_v`.
@@ -163,7 +163,7 @@ class ObstaclesAvoidance(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Pass on the velocity as far as the lane is free."""
+        """Write the received velocity, or standstill for forward motion in a blocked lane."""
         free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )

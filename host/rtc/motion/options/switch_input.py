@@ -14,11 +14,12 @@ _LOG: Final = log_of(__name__)
 
 
 class SwitchInput(RtComponent):
-    """A switch with priority for the joystick. The planner resumes `hold` after its release.
+    """A switch between the velocities of joystick and planner. The joystick has priority.
 
-    During `hold`, the cart stands. A deflected joystick without a message for `stale` counts as
-    released. A velocity with an invalid number counts as 0. The specification has only the name of
-    the component (SwitchInputRTC). Ports and parameters are additions.
+    When the joystick is released, the cart stands for the time `hold`. Then the planner resumes. A
+    deflected joystick without a message for `stale` counts as released. A velocity with an invalid
+    number counts as 0. The specification has only the name of the component (SwitchInputRTC). Ports
+    and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
@@ -44,7 +45,7 @@ class SwitchInput(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Pass on the velocity of the active input."""
+        """Write the velocity of the active input."""
         planned = read_newest(self.automatic)
         self._listen(ec)
         self._switch(ec)
