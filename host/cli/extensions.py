@@ -69,7 +69,6 @@ class ExtensionGroup(Generic[T]):
         """Return the members of other packages by name.
 
         Members that cannot be loaded are omitted and reported.
-
         """
         members = dict[str, T]()
         for point in self._foreign():

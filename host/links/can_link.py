@@ -208,8 +208,8 @@ def prepare_bus(bus: can.BusABC, interface: str) -> None:
     port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
     systems have no such option and do not need it.
 
-    The driver of socketcand also logs the exceptions that it raises, with a traceback. Those
-    log messages are dropped, because the reader of the bus reports the exceptions.
+    The driver of socketcand also logs the exceptions that it raises, with a traceback. Those log
+    messages are dropped, because the reader of the bus reports the exceptions.
     """
     let_wait(bus)
     if interface == "socketcand":

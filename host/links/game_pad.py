@@ -43,7 +43,7 @@ class Axes:
     _values: dict[int, float] = field(default_factory=dict, init=False)
 
     def take(self, kind: int, code: int, value: int) -> None:
-        """Handle an event."""
+        """Process an input event of the pad."""
         if kind == EV_KEY:
             (self.held.add if value else self.held.discard)(code)
         if kind == EV_ABS and code in self.ranges:

@@ -79,8 +79,8 @@ def guarded(
 ) -> ReturnCode:
     """Run a callback and return its code. An exception is logged and counts as RTC_ERROR.
 
-    Every exception is caught, also from a listener of a port, so that a faulty component cannot
-    end the others.
+    Every exception is caught, also from a listener of a port, so that a faulty component cannot end
+    the others.
     """
     try:
         return callback(*args, **kwargs)

@@ -36,7 +36,7 @@ def text(value: object) -> str:
 
 
 def heading(title: str, *facts: object) -> str:
-    """Return a title with facts beside it."""
+    """Return an HTML title with facts beside it."""
     return f"<p><b>{text(title)}</b> {text(' · '.join(map(str, facts)))}</p>"
 
 

@@ -230,7 +230,7 @@ def load_toml(text: str) -> dict[str, Any]:
 
 
 def read_toml(text: str) -> TomlDocument:
-    """Read a text.
+    """Parse a TOML text.
 
     Args:
         text: whole text.

@@ -151,7 +151,6 @@ def parse_records(lines: Iterable[str]) -> Iterator[Record]:
     """Parse the lines after the header.
 
     Times must not decrease, and no line may follow the end mark.
-
     """
     before = Record(0, Mark.PHYSICAL)
     for number, line in enumerate(lines, 2):

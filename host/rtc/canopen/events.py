@@ -15,7 +15,7 @@ KEPT: Final = 10_000
 
 
 class ServerEventType(StrEnum):
-    """Names of events."""
+    """The name of an event of the server."""
 
     BOOT_UP = "BootUp"
     PROXY_MADE = "ProxyMade"

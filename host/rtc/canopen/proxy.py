@@ -387,7 +387,7 @@ class ProxyRtc(RtComponent):
         return requested
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Let data pass. Request Operational."""
+        """Let data from the device reach the OutPorts, and request Operational."""
         self.requested, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
         for sink in self.sinks:
             sink.clear()
@@ -396,7 +396,7 @@ class ProxyRtc(RtComponent):
         return _OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Stop the data. Request Pre-operational."""
+        """Stop the data from the device, and request Pre-operational."""
         self.requested, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
         return _OK
 

@@ -60,8 +60,8 @@ class Probes:
 
     Each probe has a connector of its own.
 
-    The connectors belong to no component, so a saved system does not contain them. A connector
-    that injects a value ends when the value was read.
+    The connectors belong to no component, so a saved system does not contain them. A connector that
+    injects a value ends when the value was read.
 
     Args:
         manager: manager with the ports.

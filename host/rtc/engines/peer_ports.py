@@ -320,8 +320,8 @@ class InPortPushConnector(_InPortConnector[T, P]):
     def put(self, payload: P) -> PortStatus:
         """Put a value into the buffer, from any thread. It becomes readable before the next tick.
 
-        This method does not wait for the manager's thread, because that would take twice as long
-        as the call of an ORB itself.
+        This method does not wait for the manager's thread, because that would take twice as long as
+        the call of an ORB itself.
 
         Returns:
             PORT_OK, or another status of the buffer. The result is INVALID_ARGS if the value cannot

@@ -125,7 +125,7 @@ def set_latency(chain: MotionChain, response_s: float) -> None:
 
 
 def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: VelocityLimits) -> list[str]:
-    """Return a line for each measure."""
+    """Return the quality of a drive as lines of text, one for each measure."""
     least_s, track = least_time_s(plan(start, points)), run.cross_track
     took_s = run.duration_s if run.reached_s is None else run.reached_s
     share = f", {took_s / least_s:.2f} x the least time" if least_s else ""

@@ -22,7 +22,7 @@ class Pose(NamedTuple):
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 
     def distance(self, point: Pose) -> float:
-        """Return the distance of a point."""
+        """Return the distance to a point."""
         return hypot(point.x - self.x, point.y - self.y)
 
     def bearing(self, point: Pose) -> float:

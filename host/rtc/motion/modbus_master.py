@@ -34,12 +34,12 @@ class ModbusAnswer:
 class ModbusMaster:
     """A Modbus master that sends requests to one slave, one request at a time.
 
-    On a line with echo, the master skips its own frames. A late answer counts as the answer
-    to the next request, if it has the same form.
+    On a line with echo, the master skips its own frames. A late answer counts as the answer to the
+    next request, if it has the same form.
 
     pymodbus and minimalmodbus wait on the machine's clock and cannot wait on the clock of a rig.
-    Therefore this class implements the master, with the codec of the slave. The tests of the
-    slave use those libraries.
+    Therefore this class implements the master, with the codec of the slave. The tests of the slave
+    use those libraries.
 
     Args:
         link: line to the slave.

@@ -29,7 +29,7 @@ class InterfaceType(StrEnum):
 
 
 class DataflowType(StrEnum):
-    """The side that moves the values (`dataflow_type`)."""
+    """Which end of a connector transfers the values (`dataflow_type`)."""
 
     PUSH = "push"
     PULL = "pull"

@@ -45,8 +45,8 @@ class DataPort(Port[Connector[T]], Generic[T]):
 class OutPort(DataPort[T]):
     """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
 
-    Each connector gets each value, and transfers the value according to its `dataport.*`
-    properties (`ConnectorOptions.parse`).
+    Each connector gets each value, and transfers the value according to its `dataport.*` properties
+    (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
 

@@ -155,8 +155,8 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 class Arrivals:
     """A schedule item for received values: calls that are executed at the start of the next tick.
 
-    No code reads a value before the next tick, so values need not wake the manager's thread.
-    Waking it for each value would take three times the processor time.
+    No code reads a value before the next tick, so values need not wake the manager's thread. Waking
+    it for each value would take three times the processor time.
 
     Attributes:
         due_us: due time, which is always `NEVER`, because the calls wait for a tick of other items.

@@ -132,8 +132,8 @@ class PeerThreads:
     """Threads that make the calls of many connectors. Each connector makes one call at a time.
 
     As long as peers answer at once, there is one thread. This takes a third of the processor time
-    of one thread for each connector. If calls wait, a second thread is started, and one
-    more for each call that hangs.
+    of one thread for each connector. If calls wait, a second thread is started, and one more for
+    each call that hangs.
 
     Args:
         name: name of the threads, for display.

@@ -115,8 +115,8 @@ def restore(manager: Manager, system: System) -> None:
 def with_remotes(system: System, types: Container[str]) -> System:
     """Return a copy of a system in which components of unknown types are remote.
 
-    Only components with a path become remote. The RTSProfile of a system that several processes
-    run has such components.
+    Only components with a path become remote. The RTSProfile of a system that several processes run
+    has such components.
 
     Args:
         system: system that was read.

@@ -36,9 +36,9 @@ _USUAL: Final = {
 class Peers:
     """A monitor that makes and renews connectors to components of other processes.
 
-    Each connector is checked once a second, in its own thread. A connector that could
-    not be made, or whose peer restarted, is made again. A connector that was ended while the peer
-    ran is not made again.
+    Each connector is checked once a second, in its own thread. A connector that could not be made,
+    or whose peer restarted, is made again. A connector that was ended while the peer ran is not
+    made again.
 
     Args:
         ports: ports of the system.
@@ -56,7 +56,7 @@ class Peers:
             thread.submit(partial(one.look, thread.retry_s))
 
     def close(self) -> None:
-        """Stop the upkeep. The connectors stay."""
+        """Stop checking the connectors. The connectors stay."""
         for thread in self._threads:
             thread.close()
 

@@ -114,8 +114,8 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
 
     Raises:
         OSError: the table cannot be read.
-        ValueError: the table, the domain or the interface is invalid, or the table does not fit
-            the present components.
+        ValueError: the table, the domain or the interface is invalid, or the table does not fit the
+            present components.
     """
     table = _read_table(options)
     _refuse_mistakes(table, manager)

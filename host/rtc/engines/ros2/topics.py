@@ -107,7 +107,7 @@ class _Arrivals(Listener):
 class TopicReader:
     """A reader of a topic that passes on its messages.
 
-    All methods except the constructor are called in the thread.
+    Call all methods except the constructor in this thread.
 
     Args:
         participant: participant in the domain.

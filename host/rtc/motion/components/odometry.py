@@ -20,8 +20,8 @@ class Odometry(RtComponent):
     """A component that computes the pose of the middle of the drive axle from the wheel angles.
 
     The motion is integrated on exact arcs. The port LocalizedPosition exists and is unused, as in
-    the specification. A message is ignored
-    if its angles are not numbers, or if it has fewer angles than there are ids of wheels.
+    the specification. A message is ignored if its angles are not numbers, or if it has fewer angles
+    than there are ids of wheels.
 
     Attributes:
         pose: estimated pose of the cart.

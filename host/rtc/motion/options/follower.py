@@ -17,8 +17,8 @@ class Follower(RtComponent):
     Both positions are in one map frame. If the leader is nearer than `gap`, the robot stands. The
     robot never goes back. A base on two wheels turns to the leader and goes. With `sideways`, the
     robot goes straight to its wanted position and takes over the leader's heading. If either
-    position is missing for `pose_timeout`, the robot stands. Which robot leads depends
-    on the connector.
+    position is missing for `pose_timeout`, the robot stands. Which robot leads depends on the
+    connector.
 
     The report gives no control law. This law, its gains and its limits are additions.
     """
