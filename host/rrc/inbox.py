@@ -194,7 +194,7 @@ class Exchange:
         return isinstance(self.command, StableMode | Watchdog)
 
     def refuses_barrier_too(self, reason: str) -> bool:
-        """Whether an ER is the second one: the command was refused before, and now its query."""
+        """Whether an ER refuses the query that follows a command which was itself refused."""
         return self.refusal is not None and self.has_barrier and reason == self._last
 
     def take(self, answer: Answer) -> bool:

@@ -45,7 +45,7 @@ class _Operator(Protocol):
         """Show an instruction."""
 
     def confirms(self, question: str) -> bool:
-        """Ask a question. Quit ends the procedure."""
+        """Ask a question and return whether the operator confirms. Quit ends the procedure."""
         ...
 
     def waits(self) -> None:

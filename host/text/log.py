@@ -21,7 +21,7 @@ class _Logger:
         self._name = name
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Copy it as `logging` copies a logger: by its name."""
+        """Copy the logger by its name, as `logging` does."""
         return log_of, (self._name,)
 
     def __getattr__(self, name: str) -> object:

@@ -23,8 +23,8 @@ _Send = Callable[[int, bytes], None]
 class PdoDataFlow:
     """The data flow by PDO: received PDOs go to OutPorts, and values of InPorts are sent.
 
-    Data flow while the proxy is Active. Data are sent to the device only after the device has
-    become Operational.
+    Data are transferred while the proxy is Active. Data to the device also wait until the device is
+    Operational.
 
     Args:
         nodes: nodes by node-ID.

@@ -310,7 +310,7 @@ class Rewrite:
         self._was_active = proxy is not None and proxy.state is LifeCycleState.ACTIVE
 
     def begin(self) -> Script[None]:
-        """Return the script of SDO transfers that rewrites the PDOs.
+        """Return the script that rewrites the PDOs.
 
         A node that is lost during the script has the old values at its next boot.
         """

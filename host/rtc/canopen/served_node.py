@@ -359,7 +359,7 @@ class ServedNode:
             self._foreign_reset_us = at_us
 
     def run(self, now_us: int, job: QueuedScript) -> None:
-        """Run a job of another object."""
+        """Run a job that another object makes for this node."""
         self.operations.now_us = now_us
         self.dialogue.start(now_us, job)
         self._plan()

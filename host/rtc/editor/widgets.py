@@ -130,7 +130,7 @@ class CursorView(LineView, Generic[_T]):
         self.put_cursor(self.cursor + rows)
 
     def action_page(self, pages: int) -> None:
-        """Move the cursor by the number of visible rows."""
+        """Move the cursor by pages of the visible rows."""
         self.put_cursor(self.cursor + pages * max(1, self.rows - 1))
 
     def action_enter(self) -> None:
@@ -282,7 +282,7 @@ class ChoiceScreen(ModalScreen[_T | None]):
         self.choices.action_move(rows)
 
     def action_page(self, pages: int) -> None:
-        """Move the cursor by the number of visible rows."""
+        """Move the cursor by pages of the visible rows."""
         self.choices.action_page(pages)
 
     def action_leave(self) -> None:

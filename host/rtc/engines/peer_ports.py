@@ -29,7 +29,7 @@ _LOG: Final = log_of(__name__)
 
 
 class PeerState(StrEnum):
-    """Knowledge about a peer."""
+    """State of a peer, as known from the latest call to the peer."""
 
     CONNECTED = "connected"  # it answered the latest call, or none was made
     LOST = "lost"  # the latest call had no answer

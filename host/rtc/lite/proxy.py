@@ -371,11 +371,11 @@ class RtcLiteProxy(RtComponent):
         return self._command(LiteCommand.FINALIZE)
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
-        """Notify a device that wants to know."""
+        """Notify the device of the start, if it has this callback."""
         return self._optional(LiteCommand.STARTUP)
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
-        """Notify a device that wants to know."""
+        """Notify the device of the stop, if it has this callback."""
         return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:

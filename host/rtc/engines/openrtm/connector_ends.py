@@ -105,7 +105,7 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ConnectorPlace:
-    """The objects and names that a connector end needs: ORB, threads, port names.
+    """The objects and names that the local end of a connector needs.
 
     Attributes:
         orb: the ORB of this process.

@@ -59,7 +59,7 @@ class _PortSystem(Protocol):
         ...
 
     def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return a connector of two local ports, or None unless peers know both ports."""
+        """Return the profile of a connector of two local ports, if peers know both, else None."""
         ...
 
     def schedule(self, connector: ConnectorBase) -> None:
@@ -494,7 +494,7 @@ class SystemPorts:
         self._manager.connect(ports[0].full_name, ports[1].full_name, values, **names)
 
     def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return a connector of two local ports, or None unless peers know both ports."""
+        """Return the profile of a connector of two local ports, if peers know both, else None."""
         references = [self.references.get(port) for port in connector.ports]
         if len(references) != 2 or None in references:
             return None

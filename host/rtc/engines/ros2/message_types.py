@@ -41,7 +41,7 @@ class Stamps:
         self.start()
 
     def start(self) -> None:
-        """Relate the present times."""
+        """Relate the present time of the system to the present time of the machine."""
         self._start_ns = self._clock() - 1_000 * self._now_us()
 
     def to_ros(self, tm: Time) -> tuple[int, int]:

@@ -24,7 +24,7 @@ _STRAIGHT: Final = 1e-9
 def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a pose to an Odometry message.
 
-    The velocity in the message is computed from the previous pose.
+    The velocity in the message is the velocity since the previous pose.
     """
     make, speed = _odometry(entry, stamps), _Speed()
 
