@@ -127,7 +127,10 @@ _COMMANDS: Final = {
         f"{_HERE}.cli:doctor",
         "Check what tickrig can use on this machine, and show what to do.",
     ),
-    "emu": (f"{_HERE}.emu_cli:emu", "Emulate a built-in device or a device of an installed package."),
+    "emu": (
+        f"{_HERE}.emu_cli:emu",
+        "Emulate a built-in device or a device of an installed package.",
+    ),
     "init": (
         f"{_TESTING}.init_cli:init",
         "Write an initial rig file: devices with all their options.",
