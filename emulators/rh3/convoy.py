@@ -78,8 +78,8 @@ class OmniCart(RtComponent):
 class MovingControl(RtComponent):
     """Commands a base by a joystick, and stops the base when the joystick sends nothing.
 
-    The connector to the joystick may be removed while the stick is pushed. Without this component
-    RefHardRh3 would then keep the latest velocity.
+    RefHardRh3 keeps the latest velocity. So if the connector to the joystick were removed while the
+    stick is pushed, the base would go on without this component.
 
     Args:
         instance_name: instance name of the component.

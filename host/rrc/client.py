@@ -353,8 +353,8 @@ class RrcClient(Closing):
         """Sound the buzzer.
 
         Args:
-            times_us: durations of on, off, on and so on, up to ten times of 0..2_550_000 us, each a
-                multiple of 10_000 us.
+            times_us: up to ten durations in us. The buzzer is on for the first one, off for the
+                second one, and so on. Each is in 0..2_550_000 and a multiple of 10_000.
 
         Raises:
             ValueError: a time is out of range.

@@ -234,7 +234,7 @@ _T = TypeVar("_T")
 
 
 def shortened(acts: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
-    """Remove every act that is not needed for the same failure.
+    """Return the acts without those that the failure does not need.
 
     Args:
         acts: acts that fail together.

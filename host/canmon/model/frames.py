@@ -51,7 +51,8 @@ class Record(NamedTuple):
     """One frame, CAN FD frame or error frame on the bus.
 
     Attributes:
-        at_us: end of the frame in microseconds, since the epoch in logs and on real buses.
+        at_us: time in microseconds at which the frame ended. In logs and on real buses it counts
+            from the epoch (1970).
         channel: name of the bus, without blanks.
         frame: frame on the bus.
         sent: whether this program sent the frame.

@@ -62,7 +62,7 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return the same cut, so that the decoder also learns from the frames before it."""
+        """Return a cut of the same frames that lets the decoder see the earlier frames, too."""
         if self._decoder is None or cut.begin is None:
             return cut
         return replace(cut, earlier=self._decoder.take)

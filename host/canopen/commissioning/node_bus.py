@@ -157,8 +157,8 @@ class NodeFound:
     Attributes:
         node_id: node-ID of the node, 1..127.
         device_type: device type (object 1000h), or None if the node did not answer.
-        identity: identity (objects 1018h:01 to 04) by sub-index, without the sub-indices that the
-            node does not have.
+        identity: values of the identity object 1018h by sub-index, 1 to 4. A sub-index that the
+            node does not have is left out.
         name: device name (object 1008h), empty if the node has none.
         state: last reported NMT state, or None if the node reported none.
         answers: number of answers to one request. 2 means that two nodes share this node-ID.
