@@ -277,7 +277,8 @@ class _Ros2Engine:
         writer = TopicWriter(self._participant, entry)
 
         def send(message: Any) -> None:
-            self._out.submit(partial(writer.put, message))
+            # A call that returns 0 is made again, and PORT_OK is 0.
+            self._out.submit(partial(_put, writer, message))
 
         item = _Diagnostics(self._manager, self._stamps, period_us, send)
         if topic:
@@ -286,6 +287,11 @@ class _Ros2Engine:
             self._out.submit(writer.open)
             self._manager.add_item(item)
         return item
+
+
+def _put(writer: TopicWriter, message: Any) -> None:
+    """Write a message once: a call that returns 0 is repeated, and PORT_OK is 0."""
+    writer.put(message)
 
 
 _ID: Final = "ros2:/"

@@ -148,7 +148,9 @@ def test_poses_joints_and_ranges_arrive_as_messages(joined: Joined) -> None:
     scan = peer.heard("scan")[-1]
     assert scan["ranges"] == [1.0, float("inf"), 2.5]
     assert (scan["angle_min"], scan["angle_max"], scan["range_max"]) == (-0.5, 0.5, 4.0)
-    joined.until(lambda: peer.heard("diagnostics"))
+    joined.until(lambda: len(peer.heard("diagnostics")) >= 4)
+    stamps = [str(array["header"]["stamp"]) for array in peer.heard("diagnostics")]
+    assert len(set(stamps)) == len(stamps)  # each is sent once
     (status,) = peer.heard("diagnostics")[-1]["status"]
     assert (status["name"], status["message"], status["level"]) == ("Robot0", "Inactive", 1)
 
