@@ -17,6 +17,8 @@ from tests.host.rtc.engines.ros2.extra import CYCLONE
 from tests.host.rtc.engines.ros2.joined import CHAIN, DEADLINE_S, Peer, command, own_domain
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
+from tickrig.host.rtc import engines
+from tickrig.host.rtc.engines import ros2
 
 TABLE = """
 [[topic]]
@@ -127,6 +129,7 @@ def test_ports_that_do_not_fit_are_refused_with_file_and_line(folder: Path) -> N
 def test_without_the_extra_it_is_said_what_to_install(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(engines, "ros2", ros2)  # importing it again sets it
     for name in [name for name in sys.modules if ".engines.ros2" in name]:
         monkeypatch.delitem(sys.modules, name)
     for name in ("cyclonedds", "cyclonedds.core"):
