@@ -108,8 +108,8 @@ class _Kept:
         if not self._is_there() and not self._connected(peer):
             self._peer, self._reason = None, self._reason or "refused"  # our port has logged why
             return
-        if self._reason:
-            _LOG.warning("%s: connected", self.name)
+        log = _LOG.warning if self._reason else _LOG.info  # the end of a loss, or the first time
+        log("%s: connected", self.name)
         self._made, self._reason = True, ""
 
     def _connected(self, peer: Reference) -> bool:

@@ -85,6 +85,7 @@ def test_a_component_that_comes_later_and_again_is_joined(
             else:
                 peer.ask("wait", number)
             system.until(lambda: len(system.numbers) == number)  # noqa: B023
+            system.until(lambda: caplog.text.count("Far0.out: connected") == number)  # noqa: B023
             peer.kill()
     assert system.numbers == [1, 2]
     assert len(system.console_out.in_.connectors) == 1
@@ -107,10 +108,11 @@ def test_a_connector_names_its_data_type_as_rtcryo_wants_it(
     assert properties["dataport.data_type"] == "IDL:RTC/TimedLong:1.0"
 
 
-def test_a_component_that_hangs_is_kept(kept: Kept) -> None:
+def test_a_component_that_hangs_is_kept(kept: Kept, caplog: pytest.LogCaptureFixture) -> None:
     system, peer = kept.system, kept.start()
-    kept.keep("ConsoleIn0.out", "in")
-    system.until(lambda: joined(peer) and system.console_in.out.connectors)
+    with caplog.at_level(logging.INFO):
+        kept.keep("ConsoleIn0.out", "in")
+        system.until(lambda: "Far0.in: connected" in caplog.text)
     (connector,) = system.console_in.out.connectors
     peer.pause()
     system.console_in.enter(1)
