@@ -365,7 +365,7 @@ _new, _set = object.__new__, object.__setattr__
 
 
 def _read_fields(kind: type[Command], fields: tuple[_Field, ...], message: bytes) -> Command | None:
-    """Return a command of this kind, None if a parameter is no value of its table."""
+    """Return a command of this kind, or None if a parameter is not in its table."""
     command = _new(kind)
     for name, begin, end, values in fields:
         value = values.get(message[begin:end])
