@@ -88,6 +88,13 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
         assert (ROOT / named).exists(), f"{page.name} names {named}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_paragraphs_name_no_tests(page: Path) -> None:
+    """A table names them in its last column, other facts in the last section of the page."""
+    text = re.sub(r"```.*?```|^\|.*$", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert re.findall(r"^.*\bTests?:\s+`tests?[_/].*$", text, re.MULTILINE) == []
+
+
 def test_the_readme_is_short_and_its_commands_have_these_options() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     assert len(text.splitlines()) <= 120
