@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import pickle
 import re
 import runpy
 import subprocess
@@ -49,6 +50,14 @@ def typed_names(place: str) -> dict[str, str]:
         and node.module not in {"tickrig._lazy", "tickrig._version"}
         for name in node.names
     }
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_an_exception_is_shown_by_the_name_that_users_import(place: str) -> None:
+    offered = [getattr(import_module(place), name) for name in import_module(place).__all__]
+    errors = [one for one in offered if isinstance(one, type) and issubclass(one, BaseException)]
+    assert {error.__module__ for error in errors} <= {place}
+    assert all(pickle.loads(pickle.dumps(error)) is error for error in errors)
 
 
 @pytest.mark.parametrize("place", PLACES)

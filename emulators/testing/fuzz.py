@@ -180,6 +180,8 @@ _LOOK_US: Final = 10_000
 class SilentDeviceError(AssertionError):
     """A device did not answer any more."""
 
+    __module__ = "tickrig.testing"
+
 
 class DeviceFuzz:
     r"""A device on its wire, with a host and inputs that random bytes control.

@@ -37,13 +37,19 @@ def first_line(error: BaseException) -> str:
 class LinkError(Exception):
     """The link to a device failed."""
 
+    __module__ = "tickrig.host"
+
 
 class LinkTimeout(LinkError, TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
     """The device did not answer in time."""
 
+    __module__ = "tickrig.host"
+
 
 class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the link
     """The line is gone: the cable is unplugged, the port is closed, or the emulator has ended."""
+
+    __module__ = "tickrig.host"
 
 
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
@@ -56,6 +62,8 @@ class DeviceRefused(Exception):  # noqa: N818 - what the device did
     Attributes:
         code: reason code given by the device, in the notation of the device.
     """
+
+    __module__ = "tickrig.host"
 
     def __init__(self, message: str, code: str) -> None:
         super().__init__(message)

@@ -45,6 +45,11 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.errors import NotOnThisBench as NotOnThisBench
     from tickrig.emulators.testing.bench.errors import OperatorRefused as OperatorRefused
     from tickrig.emulators.testing.bench.errors import PortGone as PortGone
+    from tickrig.emulators.testing.host_clock.host_code import HostHangsError as HostHangsError
+    from tickrig.emulators.testing.host_clock.host_code import HostTimeError as HostTimeError
+    from tickrig.emulators.testing.host_clock.host_code import (
+        UnpatchedTimeError as UnpatchedTimeError,
+    )
     from tickrig.emulators.testing.rig_file.plan import RigFileError as RigFileError
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
@@ -99,6 +104,11 @@ else:
                 "NotOnThisBench",
                 "OperatorRefused",
                 "PortGone",
+            ),
+            "tickrig.emulators.testing.host_clock.host_code": (
+                "HostHangsError",
+                "HostTimeError",
+                "UnpatchedTimeError",
             ),
             "tickrig.emulators.testing.rig_file.plan": ("RigFileError",),
             "tickrig.host.control.clock": ("RealClock",),

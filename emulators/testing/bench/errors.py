@@ -16,22 +16,34 @@ from __future__ import annotations
 class BenchError(Exception):
     """A bench cannot do the operation that a test needs."""
 
+    __module__ = "tickrig"
+
 
 class NotOnThisBench(BenchError):  # noqa: N818 - no error of the test
     """The mode of this bench does not support the operation; the message has the reason."""
+
+    __module__ = "tickrig"
 
 
 class BenchBlocked(BenchError):  # noqa: N818 - no error of the device
     """A test comes to no verdict, for a reason outside the device."""
 
+    __module__ = "tickrig"
+
 
 class MachineTooSlow(BenchBlocked):
     """The machine was too slow for real time: delays may come from it, not from the device."""
+
+    __module__ = "tickrig"
 
 
 class PortGone(BenchBlocked):
     """A port, a bus or an emulator's control socket is gone."""
 
+    __module__ = "tickrig"
+
 
 class OperatorRefused(BenchBlocked):
     """A human at the terminal did not execute a request."""
+
+    __module__ = "tickrig"

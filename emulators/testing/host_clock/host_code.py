@@ -25,13 +25,19 @@ from typing import Any, Final, NamedTuple
 class HostTimeError(RuntimeError):
     """A host waits where the time cannot be advanced."""
 
+    __module__ = "tickrig"
+
 
 class UnpatchedTimeError(HostTimeError):
     """A host waits by the clock of this machine, or reads it."""
 
+    __module__ = "tickrig"
+
 
 class HostHangsError(AssertionError):
     """A host does not return: it waits longer than its bench or its machine allows."""
+
+    __module__ = "tickrig"
 
 
 _KEPT: Final = frozenset(

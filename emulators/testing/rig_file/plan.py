@@ -431,6 +431,8 @@ class RigFileError(ValueError):
         mistakes: errors in the order of their lines.
     """
 
+    __module__ = "tickrig"
+
     def __init__(self, file: str, mistakes: tuple[Mistake, ...]) -> None:
         self.file, self.mistakes = file, mistakes
         super().__init__("\n".join(f"{file}:{line}: {reason}" for line, reason in mistakes))
