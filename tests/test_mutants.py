@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.machinery import SourceFileLoader
@@ -111,3 +112,9 @@ def test_what_coverage_leaves_out_is_seen_by_other_tracers(
 ) -> None:
     measured = request.config.getoption("cov_source", [])
     assert sys.gettrace() is (None if measured else tracer)
+
+
+def test_mutants_meet_the_tests_although_the_conftest_has_frozen_the_objects() -> None:
+    command = [sys.executable, "tools/mutants", "wire/lines.py", "tests/wire/serial/test_lines.py"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "wire/lines.py: 18 of 19 killed" in done.stdout, done
