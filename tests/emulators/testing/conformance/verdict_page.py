@@ -25,20 +25,21 @@ SHOWN: Final = (
 )
 HEAD: Final = """# Verdicts on CANopen stacks
 
-What [`canmon conform --intrusive`](conform.md) reports about our slaves and two foreign stacks, in
-virtual time. `tools/conform-stacks` writes this page. The same versions give the same page.
+This page lists the results of [`canmon conform --intrusive`](conform.md) for our slaves and for two
+stacks of other projects, in virtual time. `tools/conform-stacks` writes the page. With the same
+versions of all programs, the page is always the same.
 
-A verdict is about a slave as it was built for this page. Its objects are the objects of the
-reference dictionary R1 that the stack supports. The application moves inputs and raises errors as
-far as the stack allows it, and does nothing else. A stack leaves some behaviour to the application,
-such as the values after a reset. Such behaviour fails here, but it may pass for a device with the
-same stack.
+A verdict is about one program that uses a stack, and not about the stack alone. The programs of
+this page have those objects of our reference slave R1 that the stack supports. They move inputs and
+raise errors as far as the stack allows it, and do nothing else. For example, many stacks leave it
+to the application which values an object has after a reset. Such a check fails on this page, but a
+device with the same stack may pass it.
 
 """
 BY_HAND: Final = """## CANopenNode and Lely
 
-CANopenNode and Lely are written in C, and are not in a registry of Python packages. We compared
-their verdicts [by hand](conformance-by-hand.md).
+CANopenNode and Lely are not on this page, because they are written in C and cannot be installed
+from a registry of Python packages. [Another page](conformance-by-hand.md) has their results.
 """
 MOST: Final = 160
 """Characters of what came: what else had been allowed is in a run of one's own."""
@@ -97,11 +98,15 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     yield f"## {name}\n"
     yield (
         f"Another tester has verdicts for {len(read_table(stack)) - 1} of the checks."
-        f" Both testers judged {found.both} checks; {found.same} of these verdicts are the same."
+        f" {found.both} of the checks have a verdict from both testers,"
+        f" and {found.same} of these verdicts are the same."
     )
+    if found.differences:
+        yield "\nThe two testers differ in these checks:\n"
     for one in found.differences:
-        why = f" ({one.reason})" if one.reason else ""
-        yield f"{one.check_id} differs: the other tester has {one.public}, we have {one.here}{why}."
+        yield f"- {one.check_id}: the other tester has {one.public}, our tester has {one.here}."
+        if one.reason:
+            yield f"  The reason: {one.reason}."
     failed = [one for one in report.results if one.outcome.verdict is CheckVerdict.FAIL]
     yield "\n| check | clause | what came |\n|---|---|---|"
     for result in failed:
