@@ -34,15 +34,15 @@ class Pose(Immutable):
         return remainder(self.heading_rad, tau)
 
     def moved(self, left_m: float, right_m: float, tread_m: float) -> Pose:
-        """Return the pose after both sides have rolled at steady speeds.
+        """Return the pose of a body after its left and right wheels have rolled at steady speeds.
 
         The path is an arc. It is computed exactly: the chord of an arc has the heading that the
         body has in the middle of the arc.
 
         Args:
-            left_m: distance that the left wheels rolled.
-            right_m: distance that the right wheels rolled.
-            tread_m: distance between left and right wheels.
+            left_m: distance that the left wheels rolled, in metres.
+            right_m: distance that the right wheels rolled, in metres.
+            tread_m: distance between the left and the right wheels, in metres.
 
         >>> Pose().moved(1.0, 1.0, 0.4)
         Pose(x_m=1.0, y_m=0.0, heading_rad=0.0)
@@ -53,7 +53,11 @@ class Pose(Immutable):
 def arc(
     place: tuple[float, float, float], left_m: float, right_m: float, tread_m: float
 ) -> tuple[float, float, float]:
-    """Return x, y and heading after an arc, like `Pose.moved` but with plain numbers (faster)."""
+    """Return x, y and heading after a body on two wheels has driven an arc.
+
+    This is the computation of `Pose.moved` on plain numbers. It is faster because no `Pose` is
+    made.
+    """
     x_m, y_m, heading_rad = place
     turn_rad = (right_m - left_m) / tread_m
     half_rad = turn_rad / 2
@@ -101,7 +105,11 @@ class Contact:
     slip_m_s: float = field(default=0.0, init=False)
 
     def roll(self, turn_rad: float, step_s: float) -> float:
-        """Turn the wheel at a steady speed; return the distance over the ground in metres."""
+        """Turn the wheel by an angle and return its way over the ground, in metres.
+
+        The wheel turns at a steady speed. It slips if friction cannot change its speed over the
+        ground fast enough.
+        """
         rim_m_s = turn_rad * self.radius_m / step_s
         speed_m_s = rim_m_s
         if self.friction is not None:
@@ -138,12 +146,12 @@ SIDES: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyParameters(Immutable):
-    """Parameters of a body on driven wheels.
+    """Parameters of a body on driven wheels: its kind, dimensions, mass and friction.
 
     Attributes:
-        kind: kind of body, a key of `SIDES`.
-        wheel_radius_m: radius of each wheel.
-        tread_m: distance between left and right wheels.
+        kind: kind of body, a key of `SIDES`, which lists the wheels of each side.
+        wheel_radius_m: radius of each wheel, in metres.
+        tread_m: distance between the left and the right wheels, in metres.
         mass_kg: mass on the driven wheels. Each wheel carries the same share.
         friction: coefficient of friction between wheels and ground, or None if the wheels never
             slip.
@@ -257,13 +265,13 @@ class Velocity(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OmniParameters(Immutable):
-    """Parameters of a body on omni wheels.
+    """Parameters of a body on three omni wheels, which can move in every direction.
 
     Attributes:
-        wheel_radius_m: radius of each wheel.
-        base_radius_m: distance from the middle to each wheel.
-        response_s: time constant of the wheels' speed.
-        most_rad_s: highest speed of a wheel.
+        wheel_radius_m: radius of each wheel, in metres.
+        base_radius_m: distance from the middle of the body to each wheel, in metres.
+        response_s: time constant with which a wheel follows its commanded speed, in seconds.
+        most_rad_s: highest speed of a wheel, in rad/s.
 
     Raises:
         ValueError: a number is not above 0.
@@ -281,7 +289,10 @@ class OmniParameters(Immutable):
                 raise ValueError(f"{name} {value} is not above 0 and below 1000")
 
     def wheel_speeds(self, velocity: Velocity) -> tuple[float, ...]:
-        """Return the speeds of the wheels in rad/s; if a wheel is too fast, all are scaled down."""
+        """Return the speeds of the three wheels, in rad/s, that give the body a velocity.
+
+        If a wheel would be faster than `most_rad_s`, all speeds are scaled down by the same factor.
+        """
         vx, vy, turn = velocity.vx, velocity.vy, velocity.w * self.base_radius_m
         rims = (vy * cos(at) - vx * sin(at) + turn for at in _BEARINGS)
         speeds = tuple(rim / self.wheel_radius_m for rim in rims)

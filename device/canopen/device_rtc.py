@@ -49,7 +49,12 @@ class _CanopenPort(Generic[T]):
         self.entries: Sequence[Entry] = ()
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep the value of the port in the given objects; `event` sends the TPDOs of an object."""
+        """Use the given entries of the object dictionary to hold the value of the port.
+
+        Args:
+            entries: entries of the dictionary, one for each element of the value.
+            event: function that is called with an entry to send the TPDOs that contain it.
+        """
         self.entries, self._event = entries, event
 
     @property
@@ -66,11 +71,11 @@ class _CanopenPort(Generic[T]):
 
 
 class CanopenInPort(_CanopenPort[T]):
-    """A port that the bus writes, by RPDO or SDO, and the component reads.
+    """An in-port of a component: the bus writes its value by RPDO or SDO, the component reads it.
 
     Attributes:
-        is_new: whether the bus has written the port since the latest read, even with the same
-            value.
+        is_new: whether the bus has written the port since the component last read it. Writing the
+            same value again also counts.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.IN
@@ -92,15 +97,17 @@ class CanopenInPort(_CanopenPort[T]):
 
 
 class CanopenOutPort(_CanopenPort[T]):
-    """A port that the component writes.
+    """An out-port of a component: the component writes its value, and a TPDO sends it to the bus.
 
-    Its TPDO is sent once in a tick in which the component writes the port.
+    The TPDO is sent once in each tick in which the component writes the port.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.OUT
 
     def write(self, value: T) -> None:
-        """Set the value, which is sent in the state Active even if it has not changed.
+        """Set the value of the port.
+
+        While the component is Active, its TPDO is sent even if the value has not changed.
 
         Raises:
             ValueError: the value does not have the type of the port.
@@ -172,7 +179,11 @@ class CanopenComponent(DeviceComponent):
             raise ValueError(f"{cls.__name__}: {error}") from None
 
     def error_check(self) -> Result:
-        """Check the device once a period while Inactive; an error leads to the state Error."""
+        """Check the device for errors. A component may override this callback.
+
+        It is called once a period while the component is Inactive. Returning an error changes the
+        state to Error.
+        """
 
 
 class CanopenEcho(CanopenComponent):
@@ -197,9 +208,9 @@ class CanopenEcho(CanopenComponent):
 
 
 class RtcState(Enum):
-    """State of a component (OMG RTC 1.1, LifeCycleState).
+    """State of a component in its life cycle (OMG RTC 1.1, LifeCycleState).
 
-    One additional state stands for the time after the end of the component.
+    `FINALIZED` is an additional state: the component has ended.
     """
 
     CREATED = "Created"
@@ -279,15 +290,16 @@ _ENDING: Final = {
 
 
 class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
-    """Runs the callbacks of a component before and after its node changes its NMT state.
+    """Life cycle of a component: runs its callbacks when the NMT state of the CANopen node changes.
 
-    Once the component is initialized, the NMT state of the node is the state of the component.
-    The same callbacks run whether the master, the error behaviour or the component itself changes
-    the state. They run at once, after all services have been notified.
+    Once the component is initialized, its state is determined by the NMT state of the node. The
+    same callbacks run whether the NMT master, the error behaviour or the component itself changes
+    the NMT state. The callbacks for the new state run after all services of the node have been
+    notified of it.
 
     Args:
-        node: the slave.
-        make: function that makes a component, which is joined to the dictionary.
+        node: CANopen slave on which the component runs.
+        make: function that makes a component whose ports are joined to the dictionary of the slave.
 
     Attributes:
         component: present component. A reset of the node makes a new component.
@@ -311,7 +323,10 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
 
     @property
     def activity(self) -> str:
-        """Name of the periodic callback of the present state, or "" if there is none."""
+        """Name of the callback that runs periodically in the present state, such as `on_execute`.
+
+        The name is empty if the state has no such callback or the component does not define it.
+        """
         name = _ACTIVITIES.get(self.state, "")
         own = name and getattr(type(self.component), name) is not getattr(CanopenComponent, name)
         return name if own else ""
@@ -338,7 +353,11 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         return True
 
     def moved(self, old: NmtState, new: NmtState) -> None:
-        """Run the callbacks after a change of state; an error leads to the state Error."""
+        """Run the callbacks of the component that belong to a change of the NMT state.
+
+        The node calls this method after the change. If a callback returns an error, the component
+        changes to the state Error.
+        """
         well = self._call_all(_ENTERED.get((old, new), ()))
         if well or new is NmtState.STOPPED:
             return
@@ -347,12 +366,18 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         self._node.enter(NmtState.STOPPED)
 
     def run(self) -> None:
-        """Run the periodic callback of the state; an error leads to the state Error (M5, M6)."""
+        """Run the periodic callback of the present state, such as `on_execute`.
+
+        If the callback returns an error, the component changes to the state Error (M5, M6).
+        """
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)
 
     def finalize(self) -> None:
-        """End the component (M11); the node is then silent until its supply has been cut."""
+        """End the component for good, and run the callbacks for its end (M11).
+
+        Afterwards the node sends nothing until its supply has been cut and restored.
+        """
         if self.state in _ENDING:
             self._call_all(_ENDING[self.state])
             self._finalized = True
@@ -421,15 +446,16 @@ def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
 
 
 class DeviceRtc(Application):
-    """Runs a component whose state follows the NMT state of its node.
+    """Application of a CANopen slave that runs an RT component, a "DeviceRTC".
 
-    The source is the NEDO report, 3.4.43.3, Fig. 110. Callbacks take no time. The periodic callback
-    runs for the first time one period after the component has entered the state.
+    The state of the component follows the NMT state of the slave (NEDO report, 3.4.43.3, Fig. 110).
+    Callbacks take no time. The periodic callback of a state runs for the first time one period
+    after the component has entered the state.
 
     Not emulated: service ports, configuration sets, several components on one node.
 
     Args:
-        node: the slave, whose dictionary is the dictionary of the component.
+        node: the slave, whose dictionary contains the objects of the ports.
         slot: position of the application in the order in which services act in a tick.
         kind: class of the component.
 
@@ -451,7 +477,7 @@ class DeviceRtc(Application):
         node.entered = self._moved
 
     def read(self, name: str) -> float | str:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -515,12 +541,12 @@ def application_of(kind: type[CanopenComponent]) -> ServiceMaker:
 def make_device_rtc(
     kind: type[CanopenComponent], node_id: int, nonvolatile: Nonvolatile | None = None
 ) -> CanopenSlave:
-    """Make a slave that is a DeviceRTC.
+    """Make a CANopen slave that runs an RT component (a DeviceRTC).
 
     Args:
         kind: class of the component.
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: memory kept from an earlier run.
+        nonvolatile: memory with parameters from an earlier run, or None for empty memory.
 
     Raises:
         ValueError: the component or the node-ID is invalid.

@@ -18,10 +18,12 @@ from tickrig.wire.canopen.sdo_frame import AbortCode
 
 
 class SdoAbort(Exception):  # noqa: N818 - the standard's word
-    """The access is refused; the SDO server answers with an abort frame.
+    """Exception with which an object dictionary refuses to read or write an object.
+
+    The SDO server then answers the client with an abort frame.
 
     Attributes:
-        code: the abort code.
+        code: SDO abort code that the frame contains.
     """
 
     def __init__(self, code: AbortCode) -> None:
@@ -152,7 +154,10 @@ class Entry(Part):
 
     @property
     def takes_all(self) -> bool:
-        """Whether the entry accepts every value of the right size and no callback reacts to it."""
+        """Whether every value of the right size is allowed, and no callback has to be notified.
+
+        Then a value from the bus needs no further check.
+        """
         low, high, kind = self.description.low, self.description.high, self.data_type
         free = low is None and high is None and kind is not DataType.BOOLEAN
         return free and self.guard is None and self.written is None
@@ -196,9 +201,10 @@ class Entry(Part):
                 changed(self)
 
     def force(self, data: bytes) -> None:
-        """Change the value from inside the device.
+        """Set the value from inside the device, as if the bus had written it.
 
-        The owner of the object acts as if the bus had written the value.
+        The access right, the limits and the `guard` are not checked. The service that owns the
+        object is notified by `written`.
         """
         self.assign(data)
         if self.written is not None:
@@ -232,7 +238,15 @@ class Entry(Part):
             self.guard(self, self.data_type.decode(data))
 
     def download(self, data: bytes) -> None:
-        """Write the value over the bus; raise SdoAbort if access, size, range or owner forbid."""
+        """Write a value that has come over the bus, after all checks.
+
+        Args:
+            data: bytes of the value, as on the bus.
+
+        Raises:
+            SdoAbort: the access right, the size, the limits or the service that owns the object
+                forbid the write.
+        """
         self.check_writable()
         self.check_size(len(data))
         value = self.data_type.decode(data)
@@ -265,21 +279,23 @@ NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
 
 
 class DictionaryDescription(Immutable):
-    """The constant part of a dictionary; all slaves of one type share it.
+    """The constant part of an object dictionary, without values. All slaves of one type share it.
 
     Args:
-        entries: entries in any order, which are kept sorted.
-        objects: names and kinds of arrays and records. A variable has the name of its entry.
+        entries: descriptions of the entries, in any order.
+        objects: names and object codes of arrays and records, by index. A variable has the name of
+            its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
 
     Attributes:
-        entries: entries, sorted by index and sub-index.
-        objects: names and kinds by index, sorted.
-        places: positions of the entries. The key is index << 8 | sub-index.
-        spans: positions of all entries of an object, by index.
-        elements: positions of the entries from sub-index 1 on without a gap, by index.
+        entries: descriptions of the entries, sorted by index and sub-index.
+        objects: names and object codes of all objects, by index in ascending order.
+        places: position of each entry in `entries`. The key is index << 8 | sub-index.
+        spans: positions of all entries of an object, as a slice by index.
+        elements: positions of the elements of an object, as a slice by index. The elements begin at
+            sub-index 1 and end before the first gap.
     """
 
     __slots__ = ("elements", "entries", "objects", "places", "spans")
@@ -312,19 +328,22 @@ class DictionaryDescription(Immutable):
 
 
 class Dictionary(Part):
-    """The entries of one slave, with own values and a shared description.
+    """The object dictionary of one slave: its own values, with a description that slaves share.
 
     Args:
-        entries: entries in any order, or the description of another dictionary.
-        objects: names and kinds of arrays and records. A variable has the name of its entry.
+        entries: descriptions of the entries in any order, or the description of another dictionary.
+        objects: names and object codes of arrays and records, by index. A variable has the name of
+            its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
 
     Attributes:
-        description: names, types, access, limits and defaults.
-        by_multiplexer: cache of readable entries, by the three bytes of their multiplexer.
-        answers: cache of the entries, their values and their SDO frames, by the same three bytes.
+        description: names, types, access, limits and defaults of the entries.
+        by_multiplexer: cache of readable entries. The key is the three bytes of the multiplexer in
+            an SDO frame.
+        answers: cache for SDO uploads: the entry, its bytes and the SDO frame that answers, by the
+            same key.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.wire.canopen.eds.object_table import RW
@@ -352,10 +371,10 @@ class Dictionary(Part):
         self._only: frozenset[int] | None = None
 
     def restrict(self, only: frozenset[int] | None) -> None:
-        """Restrict SDO access to some objects, as in a boot loader.
+        """Allow SDO access only to some objects, as a slave does while its boot loader runs.
 
         Args:
-            only: indices of the objects, or None for all objects.
+            only: indices of the accessible objects, or None to make all objects accessible again.
         """
         self._only = only
         self.by_multiplexer.clear()
@@ -390,29 +409,30 @@ class Dictionary(Part):
         return entry
 
     def find(self, index: int, sub: int = 0) -> Entry | None:
-        """Look up an entry.
+        """Return the entry with an index and sub-index.
 
         Args:
             index: index of the object, 0x0000..0xFFFF.
             sub: sub-index, 0x00..0xFF.
 
         Returns:
-            The entry, or None if there is none.
+            The entry, or None if the dictionary has no such entry.
         """
         place = self._places.get(index << 8 | sub)
         return None if place is None else self._entries[place]
 
     def look_up(self, multiplexer: bytes) -> Entry:
-        """Look up the entry of a multiplexer.
+        """Return the entry that an SDO frame addresses.
 
         Args:
-            multiplexer: three bytes: the index with its low byte first, and the sub-index.
+            multiplexer: bytes 1 to 3 of the frame: the index with its low byte first, then the
+                sub-index.
 
         Returns:
             The entry.
 
         Raises:
-            SdoAbort: there is no such object, or no such sub-index.
+            SdoAbort: the object or the sub-index does not exist.
         """
         entry = self.by_multiplexer.get(multiplexer)
         if entry is None:
@@ -427,22 +447,22 @@ class Dictionary(Part):
         return entry
 
     def object(self, index: int) -> list[Entry]:
-        """List the entries of an object.
+        """Return all entries of an object.
 
         Args:
             index: index of the object.
 
         Returns:
-            The entries, sorted by sub-index. The result is empty if there is no such object.
+            The entries, sorted by sub-index. The list is empty if there is no such object.
         """
         span = self.description.spans.get(index)
         return [] if span is None else self._entries[span]
 
     def within(self, area: range) -> list[int]:
-        """List the objects in an area.
+        """Return the indices of the objects in a range, such as that of the communication profile.
 
         Args:
-            area: indices, such as `range(0x1000, 0x2000)`.
+            area: range of indices, such as `range(0x1000, 0x2000)`.
 
         Returns:
             The indices that have an object, sorted.
@@ -450,14 +470,14 @@ class Dictionary(Part):
         return [index for index in self.description.spans if index in area]
 
     def elements(self, index: int, most: int = 254) -> list[Entry]:
-        """List the elements of an array.
+        """Return the elements of an array: its entries from sub-index 1 up to the first gap.
 
         Args:
             index: index of the object.
-            most: largest number of elements.
+            most: largest number of elements to return.
 
         Returns:
-            The entries of the object from sub-index 1 on, up to the first gap.
+            The entries, sorted by sub-index. The list is empty if there is no such object.
         """
         places = self.description.elements.get(index)
         return [] if places is None else self._entries[places][:most]

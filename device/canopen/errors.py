@@ -74,12 +74,12 @@ class _Behaviour(IntEnum):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ErrorBehaviour(Service):
-    """Changes the NMT state on a communication error, or on an error of the device.
+    """Changes the NMT state of the slave after an error, as 1029h (error behaviour) demands.
 
-    If 1029h lacks the sub-index of a communication error, the error acts as with the value 0.
-    Other errors without their sub-index have no effect. The service acts after the EMCY producer,
-    so that the EMCY is sent before the slave is Stopped. Writing an undefined value to 1029h is
-    refused with 0609 0030h.
+    If 1029h lacks the sub-index of communication errors, they have the effect of the value 0. Other
+    errors without their sub-index have no effect. The service acts after the EMCY producer, so that
+    the EMCY is sent before the slave is Stopped. Writing an undefined value to 1029h is refused
+    with 0609 0030h.
 
     Not emulated: sub-indices of other profiles and of manufacturers. Instead, an application may
     call `node.enter` itself.
@@ -148,13 +148,13 @@ _QUEUE_LENGTH: Final = 16
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class EmcyProducer(Service):
-    """Reports each error once when it occurs and once when it is cleared (0000h).
+    """Sends an EMCY message when an error occurs, and another one when it is cleared (0000h).
 
-    An error is identified by its code and its text. 1001h is the union of the active errors; its
-    generic bit is set while any error is active. The message at the end of an error carries the
-    register of the remaining errors. In Stopped and in bus-off messages wait and are sent
-    afterwards. A reset clears errors and messages. A service whose cause remains must raise its
-    error again.
+    An error is identified by its code and its text. 1001h is the union of the active errors, and
+    its generic bit is set while any error is active. The message at the end of an error contains
+    the register of the remaining errors. Messages that arise in Stopped and in bus-off wait and are
+    sent afterwards. A reset clears errors and messages, so a service whose error persists must
+    raise it again.
 
     Not emulated: 29-bit CAN-IDs.
     """
@@ -267,7 +267,10 @@ class _ErrorHistory(Part):
                 field.source = self._read
 
     def note(self, code: int, text: bytes) -> None:
-        """Insert an error at the top; drop the oldest error if all fields are full."""
+        """Insert an error at the top of the error history 1003h.
+
+        If all its fields are in use, the oldest error is dropped.
+        """
         if self._count is None or not self._fields:
             return
         count = min(self._count.number + 1, len(self._fields))
@@ -300,12 +303,13 @@ _MAX_NODES: Final = 127
 
 
 class EmcyConsumer(Service):
-    """Consumes the EMCY of other nodes; the sub-index is the node-ID of the producer.
+    """Receives the EMCY messages of other nodes, whose COB-IDs are in 1028h.
 
-    The application decides on the reaction. An EMCY without exactly eight bytes is ignored.
+    The sub-index is the node-ID of the producer. The application decides how to react. An EMCY
+    without exactly eight bytes is ignored.
 
     Attributes:
-        latest: the latest EMCY of each node since the reset.
+        latest: latest EMCY since the reset, by node-ID.
         on_emcy: functions that are called with the node-ID and the message.
     """
 
@@ -355,15 +359,15 @@ class _Producer(NamedTuple):
 
 
 class ErrorStateEmcy(Service):
-    """Reports error-passive (8120h) and recovery from bus-off (8140h).
+    """Sends an EMCY when the CAN controller is error-passive (8120h) or back from bus-off (8140h).
 
-    8120h is cleared when the controller is error-active again. Bus-off is a communication error
-    (1029h). 8140h is sent after the recovery from bus-off and cleared at once.
+    8120h is cleared when the controller is error-active again. Bus-off counts as a communication
+    error (1029h). 8140h is sent after the recovery from bus-off and cleared at once.
 
     Not emulated: the recovery of the controller itself.
 
     Attributes:
-        state: state that the controller has reported last.
+        state: error state that the controller has reported last.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:

@@ -46,7 +46,9 @@ _IDENTIFY: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, l
 
 
 class MessageSequence(Part):
-    """A request that consists of several messages. A wrong or missing message cancels the request.
+    """Recognises an LSS request of several messages, such as "switch state selective".
+
+    A wrong or missing message cancels the request.
 
     Args:
         tests: one test for each message, in the order of the messages.
@@ -145,7 +147,10 @@ class LssSlave(Service):
             yield LSS_MASTER_COB_ID, self._receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Return the CAN-ID of the LSS master, because a slave that receives a node-ID boots."""
+        """Return the CAN-ID of the LSS master's frames.
+
+        Such a frame may give the slave a node-ID. The slave then boots and receives other CAN-IDs.
+        """
         return (can_id for can_id, _ in self.handlers(state))
 
     def tick(self, now_us: int) -> None:

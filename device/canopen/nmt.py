@@ -86,10 +86,10 @@ class NmtSlave(Service):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatProducer(Service):
-    """Sends the NMT state once in each producer heartbeat time.
+    """Sends the heartbeat of the slave: its NMT state, once in each heartbeat time (1017h).
 
-    The boot-up message counts as the first heartbeat. A write to the heartbeat time, over the bus
-    or by the device itself, restarts the period: the next heartbeat follows one period later.
+    The boot-up message counts as the first heartbeat. A write to 1017h, over the bus or by the
+    device itself, restarts the period, so the next heartbeat follows one period later.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -138,13 +138,13 @@ _TOGGLE: Final = 0x80
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NodeGuarding(Service):
-    """Answers guarding requests with the NMT state, and checks that requests arrive in time.
+    """Answers guarding requests of the master with the NMT state, and checks that they arrive.
 
     The toggle bit is 0 after a reset and changes with each answer. Life guarding begins with the
-    first request. If no request follows within guard time times life time factor, the slave
-    raises EMCY 8130h and a communication error (1029h); both last until the next request.
-    Heartbeat has priority: while 1017h is not 0, requests are neither answered nor supervised.
-    Without 100Ch node guarding is off.
+    first request. If no request follows within guard time times life time factor, the slave raises
+    EMCY 8130h and a communication error (1029h). Both last until the next request. While the
+    heartbeat is on (1017h is not 0), requests are neither answered nor supervised. Without 100Ch
+    node guarding is off.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -215,17 +215,17 @@ class Watch(Enum):
 
 
 class Monitor(Part):
-    """Monitors the heartbeat of one node.
+    """Monitors the heartbeat of one other node, for the heartbeat consumer of a slave.
 
     Args:
-        consumer: service that the monitor belongs to.
-        value: value of an entry of 1016h, with the node-ID in bits 16 to 23 and the time in ms
-            below.
+        consumer: heartbeat consumer that the monitor belongs to.
+        value: value of an entry of 1016h, with the node-ID in bits 16 to 23 and the time in ms in
+            bits 0 to 15.
 
     Attributes:
         node_id: node-ID of the monitored node.
-        period_us: the consumer heartbeat time.
-        watch: the monitoring state.
+        period_us: consumer heartbeat time.
+        watch: state of the monitoring.
         nmt_state: NMT state that the node has sent last, or None before its first heartbeat.
         deadline_us: time from which the heartbeat of the node is late.
     """
@@ -266,18 +266,18 @@ class Monitor(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatConsumer(Service):
-    """Monitors the heartbeats of other nodes.
+    """Monitors the heartbeats of the nodes that 1016h lists.
 
-    Monitoring begins with the first heartbeat; the boot-up message counts as a heartbeat. A
-    missing heartbeat raises a communication error (1029h) and EMCY 8130h, whose first
-    manufacturer-specific byte is the node-ID. The error is cleared when a heartbeat arrives
-    again, or when the entry of 1016h is changed.
+    Monitoring of a node begins with its first heartbeat. The boot-up message counts as a heartbeat.
+    A missing heartbeat raises a communication error (1029h) and EMCY 8130h, whose first
+    manufacturer-specific byte is the node-ID. The error is cleared when a heartbeat arrives again,
+    or when the entry of 1016h is changed.
 
     An entry with time 0 or with a node-ID outside 1..127 is not used. A second entry for the same
     node-ID is refused with 0604 0043h. An entry with reserved bits is refused with 0609 0030h.
 
     Attributes:
-        monitors: the entries in use.
+        monitors: monitors of the entries in use.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:

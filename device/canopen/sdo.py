@@ -396,11 +396,11 @@ _MEMORY_BYTES: Final = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class SdoLimits(Immutable):
-    """SDO server limits that CiA 301 leaves to the device.
+    """Limits of the SDO servers of a device, which CiA 301 does not define.
 
     Attributes:
         timeout_us: time without a request after which a transfer is aborted, at least 1.
-        memory_bytes: memory of all strings and domains of the slave together. The limit of a
+        memory_bytes: memory for all strings and domains of the slave together. The limit of a
             single object is in its description.
     """
 
@@ -531,7 +531,16 @@ class SdoServer(Part):
         self.end()
 
     def initiate(self, request: bytes) -> None:
-        """Handle a request that does not continue a transfer: it starts one or ends it."""
+        """Handle a request that starts an SDO transfer, or that aborts the present one.
+
+        Requests within a transfer are handled elsewhere.
+
+        Args:
+            request: eight bytes of the client's frame.
+
+        Raises:
+            SdoAbort: the request is invalid, or the access is refused.
+        """
         command = request[0]
         if command == ClientCommand.ABORT:
             self.end()
@@ -630,13 +639,13 @@ class _Additional(NamedTuple):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SdoServers(Service):
-    """The default server and the additional servers.
+    """The SDO servers of a slave: the default server (1200h) and the additional servers (1201h on).
 
-    The default server exists even without 1200h. If 1200h exists, it is read-only and always
-    shows the COB-IDs of the default server. An additional server is active when both its COB-IDs
-    are valid; a CAN-ID changes only while its own COB-ID is invalid. Bit 30 (dynamic) is stored
-    and has no effect. Transfers end silently when the slave enters an NMT state other than
-    Pre-operational and Operational.
+    The default server exists even without 1200h. If 1200h exists, it is read-only and shows the
+    COB-IDs of the default server. An additional server is active when both its COB-IDs are valid. A
+    CAN-ID can be changed only while its own COB-ID is invalid. Bit 30 (dynamic) is stored and has
+    no effect. Transfers end silently when the slave enters an NMT state other than Pre-operational
+    and Operational.
 
     Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
 

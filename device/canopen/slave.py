@@ -80,13 +80,14 @@ from tickrig.wire.instant import NEVER
 
 @dataclass(slots=True)
 class Nonvolatile:
-    """The non-volatile memory of a slave, which an emulator may keep in a file.
+    """The non-volatile memory of a slave, whose content an emulator may keep in a file.
 
     Attributes:
-        parameters: stored values as bytes (1010h). The key is index << 8 | sub-index.
+        parameters: values stored by 1010h, as bytes. The key is index << 8 | sub-index.
         node_id: node-ID stored by LSS, or None if LSS has stored none.
         bit_rate_index: bit timing index stored by LSS, or None if LSS has stored none.
-        version: number of changes up to now, by which an emulator knows when to write its file.
+        version: number of changes up to now. An emulator compares it to know when to write its
+            file.
         program: downloaded program (1F50h), which is empty if it was cleared, or None for the
             built-in program.
     """
@@ -112,10 +113,10 @@ ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Service(Copyable):
-    """A communication service: SDO server, PDOs, SYNC, ...
+    """Base class of the communication services of a slave: SDO server, PDOs, SYNC and others.
 
-    A service finds its objects in the dictionary when it is made and attaches its callbacks to them
-    (`Entry.guard`, `written`, `source`). A missing object disables the service.
+    When a service is made, it finds its objects in the dictionary and attaches its callbacks to
+    them (`Entry.guard`, `written`, `source`). If its object is missing, the service is off.
 
     Attributes:
         node: slave that the service belongs to.
@@ -132,7 +133,7 @@ class Service(Copyable):
 
     @classmethod
     def of(cls, node: CanopenSlave) -> Self:
-        """Look up the service of this class in a slave.
+        """Return the service of this class in a slave, as in `PdoProducer.of(slave)`.
 
         Args:
             node: the slave.
@@ -155,7 +156,9 @@ class Service(Copyable):
         """Act at the end of Initialising, in a slave that has a node-ID."""
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Yield the CAN-IDs of the data frames to receive, with their handlers.
+        """Yield the CAN-IDs of the data frames that the service receives in an NMT state.
+
+        The slave calls this method to learn which function handles which frame.
 
         Args:
             state: present NMT state.
@@ -166,7 +169,7 @@ class Service(Copyable):
         return iter(())
 
     def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Yield the CAN-IDs of the remote frames to receive, with their handlers.
+        """Yield the CAN-IDs of the remote frames that the service receives in an NMT state.
 
         Args:
             state: present NMT state.
@@ -177,9 +180,10 @@ class Service(Copyable):
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Yield the CAN-IDs of frames that may change which CAN-IDs the node listens to.
+        """Yield the CAN-IDs of frames that may change which CAN-IDs the slave receives.
 
-        An acceptance filter passes all frames after such a frame.
+        After such a frame an acceptance filter lets all frames pass, until the slave has handled
+        it.
 
         Args:
             state: present NMT state.
@@ -190,7 +194,7 @@ class Service(Copyable):
         return iter(())
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """React to a change of the NMT state, after it has happened.
+        """React to a change of the NMT state. The slave calls this method after the change.
 
         Args:
             old: state before the change.
@@ -198,7 +202,7 @@ class Service(Copyable):
         """
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """React to an error, which has the arguments of `CanopenSlave.emergency`.
+        """React to an error of the device, which was raised by `CanopenSlave.emergency`.
 
         Args:
             code: emergency error code.
@@ -207,7 +211,7 @@ class Service(Copyable):
         """
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """React to the end of an error.
+        """React to the end of an error, which was cleared by `CanopenSlave.emergency_clear`.
 
         Args:
             code: emergency error code.
@@ -225,14 +229,16 @@ class Service(Copyable):
         """
 
     def tick(self, now_us: int) -> None:
-        """Do the work that is due; called in the tick for which it was scheduled.
+        """Do the work that is due. The slave calls this method in the scheduled tick.
 
         Args:
             now_us: time of the tick.
         """
 
     def follow_cob_id(self, entry: Entry) -> None:
-        """Update the CAN-IDs that the node listens to; the watcher of a COB-ID calls it.
+        """Update the CAN-IDs that the slave receives after a COB-ID has changed.
+
+        Services attach this method as a watcher to the entries of their COB-IDs.
 
         Args:
             entry: entry of the COB-ID, which has changed.
@@ -240,7 +246,7 @@ class Service(Copyable):
         self.node.rewire()
 
     def schedule(self, due_us: int) -> None:
-        """Request a call of `tick`; it replaces the previous request.
+        """Request one call of `tick`. This replaces an earlier request.
 
         Args:
             due_us: time of the call, or `NEVER` for no call.
@@ -401,7 +407,7 @@ class CanopenSlave(Copyable):
         self._listen_to(None)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Run one tick.
+        """Run one tick of the slave: handle received frames, do the work that is due, send frames.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
@@ -452,7 +458,7 @@ class CanopenSlave(Copyable):
         self._out = (*out, frame) if out else (frame,)
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
-        """Raise an error, which stays active until it is cleared.
+        """Raise an error of the device, which is sent by EMCY and is active until it is cleared.
 
         Raising an active error again has no effect.
 
@@ -467,7 +473,7 @@ class CanopenSlave(Copyable):
                 service.emergency(code, register, text)
 
     def emergency_clear(self, code: int, text: bytes | None = None) -> None:
-        """Clear an error; the call has no effect if the error is not active.
+        """Clear an error that was raised by `emergency`; do nothing if it is not active.
 
         Args:
             code: emergency error code, as it was raised.
@@ -483,7 +489,9 @@ class CanopenSlave(Copyable):
             service.communication_error()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Apply a state of the CAN controller; called by the owner of the controller.
+        """Notify all services of a new error state of the CAN controller, such as bus-off.
+
+        The emulated bus calls this method, because the controller is outside the slave.
 
         Args:
             state: new state: error active, error passive or bus-off.
@@ -493,12 +501,12 @@ class CanopenSlave(Copyable):
                 service.bus_state(state)
 
     def overrun(self) -> None:
-        """Report that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
+        """Report by EMCY 8110h that the CAN controller has lost frames. The error ends at once."""
         self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
         self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
     def schedule(self, slot: int, due_us: int) -> None:
-        """Schedule the `tick` of a service by its slot.
+        """Request one call of the `tick` of a service, which is chosen by its slot.
 
         Args:
             slot: position of the service in the order in which services act in a tick.
@@ -507,7 +515,9 @@ class CanopenSlave(Copyable):
         self.await_tick(self.services[slot], due_us)
 
     def await_tick(self, service: Service, due_us: int) -> None:
-        """Schedule the `tick` of a service; `schedule` does so by its slot.
+        """Request one call of the `tick` of a service. This replaces its earlier request.
+
+        `schedule` does the same for a service that is chosen by its slot.
 
         Args:
             service: service of the slave.
@@ -524,7 +534,10 @@ class CanopenSlave(Copyable):
             self.due_us = self._first_due()
 
     def rewire(self) -> None:
-        """Collect the CAN-IDs of all services again after a change of a COB-ID or the state."""
+        """Collect the CAN-IDs that all services receive, and their handlers, again.
+
+        This is needed after a COB-ID or the NMT state has changed.
+        """
         services, state = self.services, self.state
         self._handlers = handlers = _frame_handlers(services, state)
         found = (can_id for service in services for can_id in service.reconfigured_by(state))
@@ -537,10 +550,10 @@ class CanopenSlave(Copyable):
             notify()
 
     def enter(self, state: NmtState) -> None:
-        """Change the NMT state; services and application are notified.
+        """Change the NMT state, and notify the services and the application.
 
         Args:
-            state: new state. The present state has no effect.
+            state: new state. If it is the present state, nothing happens.
         """
         old, self.state = self.state, state
         if old is state:
@@ -641,22 +654,23 @@ def _admits(command: NmtCommand) -> bool:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Application(Service):
-    """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
+    """Base class of what a device does besides communication, such as a device profile.
 
-    The base class does nothing. A device profile overrides `on_execute`, which is called in these
-    ticks:
+    In each tick it acts after the RPDOs and SDOs have written the objects, and before the TPDOs are
+    sent. The base class does nothing. A device profile overrides `on_execute`, which is called in
+    these ticks:
 
     - ticks requested by `request` or `schedule`
     - when one of its watched objects has changed
     - when a physical input was set
 
-    The application reacts to NMT states (`state_changed`), to resets (`start`) and to lost
-    masters (`communication_error`). It also reacts to each SYNC if it adds itself to
-    `node.sync_handlers`. It reports errors by `node.emergency`.
+    The application can also react to NMT states (`state_changed`), to resets (`start`) and to lost
+    masters (`communication_error`), and to each SYNC if it adds itself to `node.sync_handlers`. It
+    reports errors by `node.emergency`.
 
     Attributes:
-        inputs: physical inputs of the device. `has_inputs` makes them.
-        outputs: physical outputs of the device. `read` returns their values.
+        inputs: physical inputs of the device, which `has_inputs` makes.
+        outputs: physical outputs of the device, whose values `read` returns.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -667,10 +681,10 @@ class Application(Service):
     def has_inputs(
         self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None
     ) -> None:
-        """Add physical inputs; setting one requests `on_execute`.
+        """Define the physical inputs of the device. Setting an input requests `on_execute`.
 
         Args:
-            table: the inputs.
+            table: descriptions of the inputs.
             groups: names of inputs that are set together, by name of the group.
         """
         self.inputs = QuantityBank(table, groups, self.request)
@@ -690,14 +704,16 @@ class Application(Service):
         raise KeyError(name)
 
     def on_execute(self, now_us: int) -> None:
-        """Read inputs, work, write outputs; a device profile overrides it.
+        """Read inputs and objects, do the work of the device, and write outputs and objects.
+
+        A device profile overrides this method.
 
         Args:
             now_us: time of the tick.
         """
 
     def without_power(self, now_us: int) -> int:
-        """Advance the time while the supply is cut: moving parts coast.
+        """Advance the physical state of the device without supply, such as a coasting motor.
 
         The method is called in the first tick without power, and when a physical input was set.
 
@@ -714,7 +730,7 @@ class Application(Service):
         self.schedule(self.node.now_us)
 
     def watch(self, entries: Iterable[Entry]) -> None:
-        """Request `on_execute` whenever one of the given objects has changed.
+        """Watch objects: a change of one of them requests a call of `on_execute`.
 
         Args:
             entries: objects to watch.
@@ -732,5 +748,8 @@ class Application(Service):
 
 
 def number_of(entry: Entry | None, default: int) -> int:
-    """Return the number in an object, or the default if the device has no such object."""
+    """Return the value of an entry as a number, or the default if the entry is None.
+
+    None means that the device does not have the object.
+    """
     return default if entry is None else entry.number

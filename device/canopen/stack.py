@@ -58,14 +58,13 @@ def make_slave(
     application: ServiceMaker = Application,
     sdo: SdoLimits = USUAL,
 ) -> CanopenSlave:
-    """Make a slave with every service that its dictionary has objects for.
+    """Make a CANopen slave with all services for which its dictionary has objects.
 
     Args:
         dictionary: the objects, with default values.
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: memory kept from an earlier run.
-        application: factory of the application, such as a device profile, or None for no
-            application.
+        nonvolatile: memory with parameters from an earlier run, or None for empty memory.
+        application: factory of the application, such as a device profile. The default does nothing.
         sdo: limits of the SDO servers.
 
     Returns:

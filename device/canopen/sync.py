@@ -168,11 +168,11 @@ _PRODUCES: Final = nmt.FLAG_30
 
 
 class TimeStamp(Service):
-    """Keeps the time of day.
+    """Receives or sends the time of day (TIME), and keeps a clock that runs on from it.
 
-    If bit 31 of 1012h is set, the slave consumes TIME. `node.time_of_day` is the time stamp that
-    was received last; `now` is the clock that continues from it. If bit 30 is set, the
-    application may send TIME by `produce`. Invalid times of day are ignored.
+    If bit 31 of 1012h is set, the slave receives TIME. `node.time_of_day` is the time stamp that
+    was received last, and `now` is the time of the clock. If bit 30 is set, the application may
+    send TIME by `produce`. Invalid times of day are ignored.
 
     Not emulated: the error of a real clock; high resolution time stamps (1013h).
     """
@@ -198,7 +198,10 @@ class TimeStamp(Service):
             yield cob_id & nmt.CAN_ID_MASK, self._receive
 
     def produce(self, time: TimeOfDay) -> None:
-        """Set the clock in the next tick; also send TIME if 1012h and the NMT state allow it.
+        """Set the clock in the next tick, and send TIME if 1012h and the NMT state allow it.
+
+        Args:
+            time: time of day to set.
 
         Raises:
             FieldError: the time is invalid.

@@ -243,10 +243,13 @@ _BANK_CHANNELS: Final = 32
 
 
 class InterruptSource(Part):
-    """Interrupt sources: a bit for each channel in banks of 32; reading over the bus clears a bank.
+    """The object 6422h, which shows the analogue inputs that have caused an interrupt.
+
+    Each channel has one bit, with 32 channels in a sub-index. Reading a sub-index over the bus
+    clears its bits.
 
     Attributes:
-        entries: the objects of the banks.
+        entries: entries of the object.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -271,11 +274,11 @@ def _read(entry: Entry) -> bytes:
 
 
 class AnalogueInput(Part):
-    """Converts and scales one channel and detects its events.
+    """One analogue input channel: converts and scales its value, and detects its events.
 
-    Integer limits and deltas are right-aligned, in the unit of the widest integer object. REAL32
-    limits and deltas are in the unit of 6403h. Without any limit or delta, each change is an
-    event.
+    Integer limits and deltas are right-aligned, in the unit of the widest integer object of the
+    channel. REAL32 limits and deltas are in the unit of 6403h. If the device has no objects for
+    limits and deltas, each change of the value is an event.
 
     Attributes:
         number: number of the channel, 1..254.
@@ -384,17 +387,18 @@ def _justified(counts: int, from_bits: int, to_bits: int) -> int:
 
 
 class AnalogueOutput(Part):
-    """Drives one output channel.
+    """One analogue output channel: drives its level from the objects that the bus writes.
 
     Integer error values are right-aligned: they are in the unit of the object and limited to its
-    range. If several objects contain the value of the channel, the object that changed last is
-    used. The other objects keep their values. A NaN or infinity leaves the output unchanged.
+    range. If several objects contain the value of the channel, the object that changed last sets
+    the level, and the other objects keep their values. A NaN or infinity leaves the level
+    unchanged.
 
     Attributes:
         number: number of the channel, 1..254.
         channel: objects and scaling of the channel.
         level: physical value of the output.
-        failed: whether the error value is output instead of the written value.
+        failed: whether the channel outputs its error value instead of the written value.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:

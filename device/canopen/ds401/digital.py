@@ -121,7 +121,9 @@ The profile leaves this time to the device.
 
 
 class DigitalInputs(Part):
-    """All digital inputs of a module; line 1 is the lowest bit.
+    """All digital inputs of an I/O module, with their polarity, filter and interrupt masks.
+
+    Line 1 is the lowest bit.
 
     Attributes:
         value: bits that the bus reads.
@@ -187,14 +189,14 @@ def _ones(bits: int) -> Iterator[int]:
 
 
 class DigitalOutputs(Part):
-    """All digital outputs of a module; line 1 is the lowest bit.
+    """All digital outputs of an I/O module, with their polarity, filter mask and error values.
 
-    A line whose bit in the filter mask is 0 keeps its level.
+    Line 1 is the lowest bit. A line whose bit in the filter mask is 0 keeps its level.
 
     Attributes:
         value: bits that the bus writes.
         lines: number of lines.
-        level: levels of the physical lines.
+        level: levels of the physical lines, one bit for each line.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:

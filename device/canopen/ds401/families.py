@@ -16,9 +16,11 @@ from tickrig.wire.canopen.datatypes import DataType
 
 
 class DigitalObjects(NamedTuple):
-    """The indices of objects with one property of digital lines, by the number of lines per entry.
+    """Indices of the objects that contain one property of digital lines, such as their polarity.
 
-    Objects for single lines have eight consecutive indices, each for up to 128 lines.
+    CiA 401 has objects of several widths for the same lines: an entry has one line, 8, 16 or 32
+    lines. For single lines there are eight consecutive objects, each for up to 128 lines. `single`
+    is the first of them.
     """
 
     single: int
@@ -51,15 +53,16 @@ DEFAULT_TRIGGER: Final = 7
 
 
 class AnalogueObjects(NamedTuple):
-    """The indices of analogue channels of one direction.
+    """Indices of the objects that contain the values and scaling of analogue inputs or of outputs.
 
     Attributes:
         integers: indices of the values of 8, 16 and 32 bit.
         real: index of the value as REAL32.
-        real_offset: index of the number that is added to the value as REAL32.
-        real_scaling: index of the factor of the value as REAL32, which applies before the offset.
-        integer_offset: index of the number that is added to an integer value.
-        integer_scaling: index of the factor of an integer value, which applies before the offset.
+        real_offset: index of the offset that is added to the REAL32 value.
+        real_scaling: index of the factor of the REAL32 value, which is applied before the offset.
+        integer_offset: index of the offset that is added to an integer value.
+        integer_scaling: index of the factor of an integer value, which is applied before the
+            offset.
     """
 
     integers: tuple[int, int, int]

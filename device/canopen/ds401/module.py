@@ -142,7 +142,7 @@ class _FaultDetector(Part):
         self._present.clear()
 
     def look(self, inputs: QuantityBank) -> bool:
-        """Report new faults and faults that have ended.
+        """Check the physical inputs for faults, and report by EMCY those that have begun or ended.
 
         Returns:
             True if a new fault stops the outputs.
@@ -297,13 +297,13 @@ class Ds401(Application):
         self._fail(failed=True)
 
     def read(self, name: str) -> int | float:
-        """Return an output as the latest tick left it.
+        """Return the level that a physical output has after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
 
         Returns:
-            The value of the output.
+            The level of the output.
 
         Raises:
             KeyError: there is no output of that name.

@@ -72,17 +72,18 @@ MEASURES: Final[Mapping[int, Measure]] = {
 
 
 class ActualValues(Part):
-    """The actual values of the objects that the device has, as the latest tick left them.
+    """The objects of a drive that show actual values, such as position, velocity and current.
 
-    An object is computed when it is read. Objects with watchers are computed in each tick. A bus
-    reads only two of thirteen objects every 10 ms, so 1.5 times as many drives are possible.
+    A value is computed when the object is read. Only objects with watchers are computed in each
+    tick. This saves time: a bus reads only two of the thirteen objects every 10 ms, so 1.5 times as
+    many drives are possible.
 
     Args:
         drive: drive whose `measures` compute the values.
-        dictionary: dictionary that contains the objects.
+        dictionary: dictionary of the drive, which may lack some of the objects.
 
     Attributes:
-        watched: objects with watchers, which are called on each change.
+        watched: whether any of the objects has watchers, so that each tick has to compute it.
     """
 
     def __init__(self, drive: Ds402, dictionary: Dictionary) -> None:
@@ -94,7 +95,10 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Store the present values in the entries, which are read until the end of the tick."""
+        """Store the present values in the objects.
+
+        Reads return the stored values until `renew` is called at the end of the tick.
+        """
         if not self._kept:
             for entry in self._entries:
                 entry.assign(self._encoded(entry))

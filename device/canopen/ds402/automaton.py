@@ -83,9 +83,9 @@ def command_of(controlword: int) -> Command | None:
 
 
 class Automaton(Part):
-    """The state machine of a drive (CiA 402).
+    """The state machine of a drive (CiA 402), which follows the controlword and faults.
 
-    It brakes before transitions 5 and 8 if their option codes require that.
+    Before transitions 5 and 8 it brakes the motor if the option codes require that.
 
     Args:
         stopping: object that brakes according to the option codes.
@@ -116,7 +116,10 @@ class Automaton(Part):
         self.state, self._leaving = DriveState.NOT_READY_TO_SWITCH_ON, None
 
     def obey(self, command: Command) -> None:
-        """Make the transition that a command causes in the present state, if there is one."""
+        """Make the state transition that a command of the controlword causes.
+
+        The command has no effect if the present state has no transition for it.
+        """
         if self.state is DriveState.OPERATION_ENABLED:
             self._leaving = None
         following = NEXT_STATE.get((self.state, command))
@@ -143,7 +146,7 @@ class Automaton(Part):
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
     def run(self) -> bool:
-        """Run one control period in the present state, in which the mode is not active.
+        """Run one control period while the mode of operation is not active, as in a quick stop.
 
         Returns:
             True if the drive has no work until an input changes.
@@ -214,16 +217,16 @@ class Bounds(Immutable):
 
 
 class Supervision(Part):
-    """Detects faults from the measurements of the drive.
+    """Detects faults of a drive in each tick, such as under-voltage or a stalled motor.
 
     Args:
-        axis: the supervised axis.
+        axis: axis whose motor is supervised.
         bounds: limits within which the drive reports no fault.
 
     Attributes:
         wired: faults that the electronics detect from the present inputs.
-        has_supply: whether the supply is high enough (bit 4 of the statusword).
-        waiting: whether a time-out is running.
+        has_supply: whether the supply voltage is high enough (bit 4 of the statusword).
+        waiting: whether a time-out is running, after which a fault would be reported.
         not_following: whether the following error is larger than 6065h.
     """
 
@@ -240,7 +243,10 @@ class Supervision(Part):
         return self._axis.motor.winding_dc >= self.bounds.winding_warning_dc
 
     def present(self, *, powered: bool) -> list[ErrorCode]:
-        """Return the faults whose cause is present; a short circuit is detected only with power."""
+        """Return the faults whose cause is present in this tick, apart from faults of the motion.
+
+        A short circuit is detected only while the motor is powered.
+        """
         motor, bounds = self._axis.motor, self.bounds
         supply_mv = motor.supply_mv
         lowest_mv, highest_mv = bounds.supply_mv
@@ -254,11 +260,11 @@ class Supervision(Part):
         return found
 
     def step(self, now_us: int, *, powered: bool) -> list[ErrorCode]:
-        """Check for one tick.
+        """Check the drive for faults in one tick.
 
         Returns:
-            The present faults, and the faults that can be detected only while the motor moves
-            with power.
+            The faults of `present`. While the motor is powered, a following error and a stalled
+            motor are added.
         """
         found, self.waiting = self.present(powered=powered), False
         self.has_supply = ErrorCode.UNDER_VOLTAGE not in found

@@ -28,17 +28,17 @@ class Control(Enum):
 
 
 class Reference(Part):
-    """The demanded motion; it belongs to the drive and survives a change of mode.
+    """The demanded motion of a drive. It belongs to the drive, so it survives a change of mode.
 
     Quantities that a mode does not control follow the motor: the position in velocity modes,
-    position and velocity in torque modes. Therefore the reference has no jump when the next mode
+    position and velocity in torque modes. Therefore the reference does not jump when the next mode
     starts.
 
     Attributes:
-        position: position in counts of the motor's encoder.
-        velocity: velocity in counts per second.
-        acceleration: acceleration in counts per second per second, for the feed-forward.
-        current_a: current in amperes.
+        position: demanded position in counts of the motor's encoder.
+        velocity: demanded velocity in counts per second.
+        acceleration: acceleration for the feed-forward, in counts per second per second.
+        current_a: demanded current in amperes.
     """
 
     __slots__ = ("acceleration", "current_a", "position", "velocity")
@@ -50,12 +50,15 @@ class Reference(Part):
         self.current_a: float = 0.0
 
     def ramp(self, velocity: float, acceleration: float, deceleration: float) -> bool:
-        """Make a step towards a velocity; return whether it is reached.
+        """Change the demanded velocity towards a target for one control period.
 
         Args:
             velocity: target velocity in counts per second.
-            acceleration: acceleration of a step away from zero, as a positive number.
-            deceleration: acceleration of a step towards zero, as a positive number.
+            acceleration: acceleration while the speed increases, above 0.
+            deceleration: acceleration while the speed decreases, above 0.
+
+        Returns:
+            True if the target velocity is reached.
         """
         before = self.velocity
         braking = abs(velocity) < abs(before) or velocity * before < 0
@@ -174,14 +177,14 @@ tick."""
 
 
 class Axis(Part):
-    """An axis, with its motor, its reference and the positions of the user.
+    """An axis of a drive: its motor, its demanded motion, and the conversion to units of the user.
 
     Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
 
     Attributes:
         motor: the motor.
         reference: the demanded motion, in counts.
-        control: control loop used in this tick.
+        control: control loop used in this tick: position, velocity or current.
         settings: the present configuration.
         zero: number of encoder counts at position 0 of the user.
         homed: whether a homing has set `zero`.
@@ -314,12 +317,12 @@ _STAYING: Final = 4
 
 
 class Stopping(Part):
-    """Slows down the reference of an axis, according to an option code.
+    """Brakes an axis according to an option code, such as 605Ah for a quick stop.
 
     Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
 
     Args:
-        axis: the axis to slow down.
+        axis: axis whose demanded velocity is reduced.
         parameters: objects with the option codes.
     """
 
@@ -340,7 +343,12 @@ class Stopping(Part):
         return self.brake(self._parameters.number(index))
 
     def brake(self, ramp: int) -> bool:
-        """Make a step of a ramp.
+        """Brake for one control period with a deceleration of the drive.
+
+        Args:
+            ramp: ramp according to an option code, a member of `Ramp`: none, with the profile
+                deceleration, with the quick stop deceleration, or as hard as the current limit
+                allows.
 
         Returns:
             True if the motor stands or does not need to be slowed down.
@@ -384,11 +392,11 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 
 
 class Switches(Part):
-    """The switches as the drive reads them.
+    """The limit switches and the home switch of an axis, as the drive reads them.
 
-    A switch is pressed by hand or by the shaft at an angle.
-
-    Negative and positive are the directions of the user, that is with the polarity 607Eh applied.
+    A switch is pressed by a physical input ("by hand"), or by the shaft while it is within a range
+    of angles. Negative and positive are the directions of the user, after the polarity 607Eh is
+    applied.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.
@@ -448,10 +456,10 @@ Clamped = tuple[float, bool]
 
 
 class Limits(Part):
-    """Limits of an axis.
+    """Limits the demands on an axis: its velocity, its position and its current.
 
     Args:
-        axis: the axis with the settings.
+        axis: the axis, whose settings contain the limits.
         switches: limit switches of the axis.
     """
 
@@ -476,10 +484,10 @@ class Limits(Part):
         return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
     def reached(self) -> ErrorCode | None:
-        """Return the limit that ends the motion of the reference, or None if no limit does.
+        """Return the error code of the limit that must end the present motion, or None without one.
 
-        The limit is a pressed limit switch, or a software limit that the motion would exceed if
-        it did not brake now.
+        The limit is a limit switch that is pressed in the direction of motion, or a software limit
+        that the motion would exceed if it did not brake now.
         """
         axis, reference = self._axis, self._axis.reference
         towards = reference.velocity

@@ -232,13 +232,17 @@ class Ds402(Application):
 
     @property
     def limited(self) -> bool:
-        """Whether a limit cut a demand in the latest tick (bit 11 of the statusword)."""
+        """Whether a limit reduced a demand in the latest tick (bit 11 of the statusword)."""
         self._stretch.catch_up()
         return self._limited
 
     @property
     def goes_on_plainly(self) -> bool:
-        """Whether the next ticks only run the mode, and nothing else needs each of them."""
+        """Whether the next ticks only continue the motion of the mode of operation.
+
+        Then several ticks can be computed at once. It is False while an input has changed, a
+        time-out runs, a watcher needs each value, or a limit switch could act.
+        """
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free
         return self.automaton.operating and not (changes or waits)
@@ -254,7 +258,7 @@ class Ds402(Application):
         return self._faults[-1] if self._faults else 0
 
     def read(self, name: str) -> int | float | str:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -268,9 +272,12 @@ class Ds402(Application):
         return terminals.READ[name](self)
 
     def fault(self, code: int) -> None:
-        """Set a fault with an emergency error code.
+        """Put the drive into a fault, and send its emergency error code by EMCY.
 
-        The call has no effect if the fault is already present.
+        The call has no effect if the drive already has this fault.
+
+        Args:
+            code: emergency error code.
         """
         if code not in self._faults:
             self._note(code)
@@ -361,7 +368,7 @@ class Ds402(Application):
         super().request()
 
     def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
-        """Set the state of the drive to the state after ticks that a stretch has computed.
+        """Apply ticks that `Stretch` has computed ahead, as if they had been run one by one.
 
         Args:
             ticks: number of computed ticks.

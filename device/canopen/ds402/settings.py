@@ -75,7 +75,9 @@ def register_of(code: int) -> ErrorRegister:
 
 
 class Parameters(Part):
-    """Reads objects, with defaults for missing ones, and writes those that exist.
+    """Gives a drive access to its objects, even if its dictionary lacks some of them.
+
+    Reading a missing object returns its default. Writing to a missing object has no effect.
 
     Args:
         dictionary: the dictionary of the slave.
@@ -88,17 +90,17 @@ class Parameters(Part):
         self._dictionary, self._defaults = dictionary, defaults
 
     def number(self, index: int, sub: int = 0) -> int:
-        """Return the value of an object.
+        """Return the value of an object as a number.
 
-        For a missing object, return its default, or 0 if it has no default.
+        If the device does not have the object, return its default, or 0 if it has no default.
         """
         entry = self._dictionary.find(index, sub)
         return self._defaults.get((index, sub), 0) if entry is None else entry.number
 
     def write(self, index: int, value: int, sub: int = 0) -> None:
-        """Set a value if the device has the object.
+        """Set the value of an object; do nothing if the device does not have the object.
 
-        A value out of range is limited.
+        A value out of the range of the data type is replaced by the nearest value in it.
         """
         entry = self._dictionary.find(index, sub)
         if entry is not None:

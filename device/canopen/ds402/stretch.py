@@ -40,15 +40,15 @@ class Stretch(Part):
         self._bounds: Bounds
 
     def plan(self, now_us: int, *, requested: bool) -> int:
-        """Compute the ticks after the present tick.
+        """Compute the ticks after the present tick ahead, as far as they only continue the motion.
 
         Args:
             now_us: time of the present tick.
-            requested: whether a frame or an input requested the present tick. A tick that is not
-                requested was due by the schedule.
+            requested: whether a frame or an input caused the present tick. Otherwise the tick was
+                scheduled.
 
         Returns:
-            The duration of the computed ticks in microseconds.
+            The duration of the computed ticks in microseconds, or 0 if none were computed.
         """
         most, servo = self._most_us(now_us, requested=requested) // TICK_US, self._servo
         if most < _FEWEST or servo is None or not self._drive.goes_on_plainly:

@@ -40,12 +40,12 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PathLimits(Immutable):
-    """Limits of a path, all greater than 0.
+    """Limits of velocity and acceleration within which a path is planned, all greater than 0.
 
     Attributes:
         velocity: the highest velocity.
-        acceleration: steepest ramp away from standstill. For a sin^2 ramp it is the peak.
-        deceleration: steepest ramp towards standstill. For a sin^2 ramp it is the peak.
+        acceleration: acceleration while the speed increases. For a sin^2 ramp it is the peak value.
+        deceleration: acceleration while the speed decreases. For a sin^2 ramp it is the peak value.
         shape: shape of the ramps.
     """
 
@@ -91,11 +91,13 @@ class _RampLeg(Immutable):
 
 
 class Path(Part):
-    """A planned path. After its end the motion continues at the last velocity.
+    """A planned motion of the reference: ramps, and times of constant velocity between them.
+
+    After its end the motion continues at the last velocity.
 
     Attributes:
         began_us: time at which the path begins.
-        end_s: duration of the path.
+        end_s: duration of the path, in seconds.
         end: position and velocity at the end of the path.
     """
 
@@ -144,9 +146,10 @@ class Path(Part):
 
 
 def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
-    """Plan a change of velocity, without applying the velocity limit.
+    """Plan the path from the present motion to another velocity.
 
-    For a change of direction the path brakes to standstill first and then accelerates.
+    If the direction changes, the path brakes to standstill first and then accelerates. The velocity
+    limit is not applied.
     """
     legs = _ramps(start.velocity, velocity, _effective(limits))
     return Path(now_us, start, legs, limits.shape)
@@ -220,9 +223,10 @@ def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -
 
 
 class PathFollower(Part):
-    """Keeps the reference on a path, as long as nothing else moves it.
+    """Moves the reference of a drive along planned paths.
 
-    Each path begins at the reference of the previous tick.
+    Each path begins at the reference of the previous tick. The follower notices if something else
+    has changed the reference, because the path is then no longer valid.
 
     Args:
         reference: the reference of the drive.
@@ -261,5 +265,8 @@ class PathFollower(Part):
 
 
 def began_us(now_us: int) -> int:
-    """Return the time of the reference that a mode finds in this tick, in microseconds."""
+    """Return the time at which a path that is planned in this tick begins, in microseconds.
+
+    It is the time of the previous tick, because the reference still has the values of that tick.
+    """
     return now_us - TICK_US

@@ -80,7 +80,7 @@ PROFILE: Final = CommunicationProfile(
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Epos(Ds402):
-    """A drive with Maxon's own modes, units and error codes.
+    """A Maxon EPOS drive: a CiA 402 drive with Maxon's own modes, units and error codes.
 
     Velocities are in revolutions of the motor per minute, accelerations in revolutions per minute
     per second, positions in counts of the motor's encoder. Bit 8 of the statusword means that the
@@ -103,7 +103,7 @@ class Epos(Ds402):
 
 
 def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) -> CanopenSlave:
-    """Make a positioning drive like Maxon's EPOS 24/5, at a wheel of beego.
+    """Make an emulated drive like Maxon's EPOS 24/5, as used at a wheel of the robot beego.
 
     Args:
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.

@@ -56,7 +56,7 @@ PROFILE: Final = CommunicationProfile(
 
 
 def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) -> CanopenSlave:
-    """Make the I/O module f-palette-CANopen.
+    """Make an emulated I/O module f-palette-CANopen.
 
     Args:
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.

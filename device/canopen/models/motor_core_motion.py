@@ -43,13 +43,16 @@ _LANDING_NDEG: Final = 1_000
 
 @dataclass(slots=True)
 class Trajectory:
-    """Position and velocity, stepped by control ticks of constant acceleration.
+    """Demanded position and velocity of the shaft, planned one control tick at a time.
+
+    The acceleration is constant within a control tick.
 
     Not emulated: a limit of the jerk.
 
     Attributes:
-        position_ndeg: position at the end of the present control tick.
-        velocity_udeg_s: velocity at the end of the present control tick.
+        position_ndeg: position at the end of the present control tick, in 1e-9 degrees.
+        velocity_udeg_s: velocity at the end of the present control tick, in 1e-6 degrees per
+            second.
         begin_ndeg: position at the start of the control tick.
         begin_udeg_s: velocity at the start of the control tick.
     """
@@ -65,7 +68,7 @@ class Trajectory:
         self._begin()
 
     def approach(self, target_ndeg: int, limit_udeg_s: int) -> None:
-        """Make a step that stops at the target as early as the limits allow.
+        """Plan one control tick towards an angle, to stop there as early as possible.
 
         Args:
             target_ndeg: angle at which to stop.
@@ -89,10 +92,13 @@ class Trajectory:
         self.position_ndeg += _NDEG * (self.begin_udeg_s + self.velocity_udeg_s)
 
     def at(self, since_us: int) -> tuple[float, float, float]:
-        """Return position in deg, velocity in deg/s and acceleration in deg/s^2 within the tick.
+        """Return the demanded motion at a time within the present control tick.
 
         Args:
             since_us: time since the start of the control tick, 0..`CONTROL_US`.
+
+        Returns:
+            Position in deg, velocity in deg/s and acceleration in deg/s^2.
         """
         acceleration = (self.velocity_udeg_s - self.begin_udeg_s) / CONTROL_US
         since_s, begin = since_us / 1e6, self.begin_udeg_s / 1e6
@@ -129,10 +135,10 @@ _MAX_CURRENT_MA: Final = 10_000
 
 
 class References(Part):
-    """Reference, limits and full scales.
+    """The reference and the limits that the master writes to a motor core unit, in physical units.
 
-    Full scale is 32767. If 6443h:01 is not 0, the error value 6444h:01 is the reference from a
-    failure until another reference arrives.
+    On the bus 32767 stands for the full scale of an angle, velocity or current. After a failure the
+    error value 6444h:01 is the reference until the next reference arrives, if 6443h:01 is not 0.
 
     Args:
         node: the slave.
@@ -244,12 +250,12 @@ def _limited(value: int, most: int) -> int:
 
 
 class Shaft(Part):
-    """The angle of the shaft, from the counts of the motor encoder.
+    """The output shaft of a motor core unit: measures its angle and commands its servo.
 
-    The gear encoder defines the angle 0.
+    The angle comes from the counts of the motor encoder. The gear encoder defines the angle 0.
 
     Args:
-        servo: motor, gear and loops.
+        servo: servo with the motor, the gear and the control loops.
     """
 
     def __init__(self, servo: Servo) -> None:
@@ -349,19 +355,19 @@ _LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
 
 
 class Motion(Part):
-    """Plans one control tick at a time, and commands the motor each millisecond.
+    """Plans the motion of a motor core unit, and commands its motor each millisecond.
 
-    Each action starts from the present motion: the planned velocity (the measured velocity if
-    none is planned), the measured angle, the present current.
+    The motion is planned for one control tick at a time. Each action starts from the present
+    motion: from the planned velocity (or the measured velocity if none is planned), the measured
+    angle and the present current.
 
     Args:
         shaft: the shaft after the gear of the motor.
-        references: demands on the motor.
+        references: reference and limits from the master.
 
     Attributes:
         action: present action of the motor.
-        reached: whether the planned motion has ended at the reference and the motor has reached
-            it.
+        reached: whether the planned motion has ended at the reference and the motor has reached it.
     """
 
     def __init__(self, shaft: Shaft, references: References) -> None:
@@ -424,7 +430,7 @@ class Motion(Part):
         self.reached = self.reached and not self.deviates(0)
 
     def drive(self, since_us: int) -> None:
-        """Command the motor until the next ms.
+        """Command the motor for the next millisecond of the planned motion.
 
         Args:
             since_us: time since the start of the control tick.
@@ -487,12 +493,14 @@ class Status(IntFlag):
 
 
 class Display(Part):
-    """Writes 2001h and 6401h, once a control tick.
+    """Writes the status (2001h) and the measured values (6401h) of a motor core unit.
+
+    They are written to the dictionary once in each control tick.
 
     Args:
         dictionary: the dictionary of the unit.
-        shaft: object with the measurements.
-        references: object with the full scales.
+        shaft: shaft that supplies the measurements.
+        references: object that converts measurements with the full scales.
     """
 
     def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:

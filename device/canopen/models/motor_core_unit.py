@@ -282,18 +282,19 @@ _COOLED_C: Final = 0.1
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class MotorCoreUnit(Application):
-    """A brushless motor with strain wave gear, two encoders and driver (NEDO report, Table 5).
+    """Application of a motor core unit: a brushless motor with gear (NEDO report, Table 5).
 
-    A reference takes effect only in Operational. In other NMT states a motor that has a mode
-    brakes to standstill and is held there. A control tick lasts 10 ms; an event that wakes a unit
-    at rest starts a control tick. A fault switches off the motor. The motor stays off until 2000h
-    is written after the causes of all faults have ended.
+    The unit has a strain wave gear, two encoders and a driver. A reference takes effect only in
+    Operational. In other NMT states a motor that has a mode brakes to standstill and is held there.
+    A control tick lasts 10 ms. While the unit rests, an event starts a control tick. A fault
+    switches off the motor. The motor stays off until 2000h is written after the causes of all
+    faults have ended.
 
     Not emulated: commutation, torque ripple, elasticity and play of the gear, power that flows back
     into the supply while braking, failure of the control supply.
 
     Attributes:
-        servo: motor, gear and loops.
+        servo: servo with the motor, the gear and the control loops.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -476,7 +477,7 @@ make_application: Final = MotorCoreUnit
 def make_motor_core_unit(
     node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None
 ) -> CanopenSlave:
-    """Make a motor core unit with its motor.
+    """Make an emulated motor core unit, a CANopen slave with its motor and gear.
 
     Args:
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.

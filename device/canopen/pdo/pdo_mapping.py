@@ -28,10 +28,10 @@ Unpack = Callable[[bytes], None]
 
 
 class Slot(NamedTuple):
-    """One mapped object.
+    """One mapped object of a PDO, with its number of bits.
 
     Attributes:
-        entry: the object, or None for a dummy, which fills bits of an RPDO.
+        entry: the object, or None for a dummy, which only fills bits of an RPDO.
         bits: number of bits in the PDO.
     """
 
@@ -59,7 +59,7 @@ def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
 
 
 def make_pack(slots: tuple[Slot, ...]) -> Pack:
-    """Return a function that packs the entries into the bytes of a TPDO.
+    """Return a function that packs the present values of mapped objects into the bytes of a TPDO.
 
     If an object is mapped with fewer bits than it has, the TPDO contains its low bits.
     """
@@ -73,9 +73,9 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
 
 
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
-    """Return a function that unpacks the bytes of an RPDO into the entries.
+    """Return a function that writes the bytes of an RPDO to the mapped objects.
 
-    The RPDO must have enough bytes; bytes after the last object are ignored. An object that is
+    The RPDO must have enough bytes, and bytes after the last object are ignored. An object that is
     mapped with fewer bits than it has gets zeros in its upper bits, as in CANopenNode.
     """
     if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
@@ -205,16 +205,16 @@ class _MpdoQueue(TpdoMode):
         self._waiting: dict[object, bytes | Entry] = {}
 
     def put(self, key: object, frame: bytes | Entry) -> None:
-        """Queue a frame and send it as soon as the inhibit time allows.
+        """Queue an MPDO, which is sent as soon as the inhibit time allows.
 
-        If a frame of the entry is already waiting, it gets the later value.
+        If an MPDO with the same key is already waiting, the new MPDO replaces it.
         """
         self._waiting[key] = frame
         self.due_us = self._free_us
         self.sender.wake(self.due_us)
 
     def run(self, now_us: int) -> None:
-        """Send the first waiting frame, or all waiting frames if there is no inhibit time."""
+        """Send the first waiting MPDO, or all waiting MPDOs if there is no inhibit time."""
         while self._waiting and self._free_us <= now_us:
             frame = self._waiting.pop(next(iter(self._waiting)))
             self.sender.send(frame if isinstance(frame, bytes) else self._frame_of(frame))
@@ -230,9 +230,9 @@ class _MpdoQueue(TpdoMode):
 
 
 class DamProducer(_MpdoQueue):
-    """MPDO in destination address mode: the application chooses object and destination.
+    """Sends MPDOs in destination address mode, which write an object of another node.
 
-    The MPDO does not use its own mapping entry.
+    The application chooses the object and the node. The mapping entry of the MPDO is not used.
     """
 
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:
@@ -241,7 +241,7 @@ class DamProducer(_MpdoQueue):
 
 
 class SamProducer(_MpdoQueue):
-    """MPDO in source address mode: each change of an object of the scanner lists is sent."""
+    """Sends MPDOs in source address mode: one for each change of an object in the scanner lists."""
 
     def request(self, entry: Entry | None = None) -> None:
         """Send an object that has changed."""
@@ -250,10 +250,10 @@ class SamProducer(_MpdoQueue):
 
 
 class DamConsumer(Part):
-    """Writes the object that an MPDO in destination address mode names.
+    """Receives MPDOs in destination address mode, and writes the objects that they name.
 
-    An MPDO for another node is ignored. An MPDO for a missing object raises EMCY 8230h, which the
-    next valid MPDO clears.
+    An MPDO for another node is ignored. An MPDO for an object that does not exist raises EMCY
+    8230h, which the next valid MPDO clears.
     """
 
     def __init__(self, node: CanopenSlave) -> None:
@@ -278,9 +278,10 @@ class DamConsumer(Part):
 
 
 class SamConsumer(Part):
-    """Writes the object that the dispatching list assigns to an object of a producer.
+    """Receives MPDOs in source address mode, which name an object of their producer.
 
-    An MPDO with an object that is not in the list is ignored.
+    The object dispatching list assigns an object of this slave to the producer's object. The MPDO
+    is written to this object. An MPDO with an object that is not in the list is ignored.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -347,7 +348,10 @@ class PdoMapping(Part):
         return len(self._objects) if self._count is None else self._count.number
 
     def slots(self) -> tuple[Slot, ...]:
-        """Return the mapped objects; no objects if the mapping is invalid, or for an MPDO."""
+        """Return the mapped objects of the PDO.
+
+        The result is empty if the mapping is invalid or the PDO is an MPDO.
+        """
         try:
             slots = self._slots(self.count)
         except SdoAbort:

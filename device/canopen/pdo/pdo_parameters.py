@@ -38,9 +38,9 @@ _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 class PdoParameters(Part):
     """The communication parameters of a PDO: CAN-ID, transmission type and timing.
 
-    The CAN-ID, the inhibit time and the SYNC start value change only while the PDO is invalid.
-    The transmission type and the event timer change at any time, and bit 30 may change while the
-    PDO is valid. A write that breaks these rules is refused with 0609 0030h.
+    The CAN-ID, the inhibit time and the SYNC start value can be changed only while the PDO is
+    invalid. The transmission type, the event timer and bit 30 of the COB-ID can always be changed.
+    A write that breaks these rules is refused with 0609 0030h.
 
     Not emulated: PDOs with a 29-bit CAN-ID; bit 29 is refused.
 
@@ -136,12 +136,14 @@ class PdoParameters(Part):
 
 
 class TpdoMode(Part):
-    """Base of transmission types: a TPDO that is sent only on a remote frame.
+    """Decides when a TPDO is sent. There is a subclass for each group of transmission types.
+
+    The base class sends the TPDO only in answer to a remote frame.
 
     Attributes:
-        due_us: time at which the mode is due to run.
+        due_us: time at which `run` must be called.
         synchronous: whether the mode reacts to SYNC.
-        timed: whether the mode ever needs to run at a given time.
+        timed: whether the mode ever needs a call of `run`.
         on_change: whether a change of a mapped object is an event.
         on_sync: function that is called with the counter of each SYNC, or with 0 if the SYNC has no
             counter.
@@ -158,7 +160,11 @@ class TpdoMode(Part):
         self.on_sync: Callable[[int], None] = _ignore
 
     def request(self, entry: Entry | None = None) -> None:
-        """Handle an event: the change of an object, or an event raised by the application."""
+        """Handle an event that may send the TPDO.
+
+        Args:
+            entry: mapped object that has changed, or None for an event that the application raised.
+        """
 
     def run(self, now_us: int) -> None:
         """Do the work that is due."""
@@ -179,7 +185,10 @@ class Silent(TpdoMode):
 
 
 class SynchronousAcyclic(TpdoMode):
-    """Type 0: the TPDO is sent with the first SYNC, and with the SYNC after an event."""
+    """Transmission type 0: the TPDO is sent with a SYNC, but only after an event.
+
+    It is also sent with the first SYNC after the start.
+    """
 
     synchronous: ClassVar[bool] = True
     on_change: ClassVar[bool] = True
@@ -200,10 +209,10 @@ class SynchronousAcyclic(TpdoMode):
 
 
 class SynchronousCyclic(TpdoMode):
-    """Types 1 to 240: the TPDO is sent with every n-th SYNC, counted from the start.
+    """Transmission types 1 to 240: the TPDO is sent with every n-th SYNC, counted from the start.
 
-    If a SYNC start value is set and SYNC carries a counter, the TPDO is sent first with the SYNC
-    whose counter has that value, as in CANopenNode.
+    If a SYNC start value is set and SYNC has a counter, the TPDO is sent first with the SYNC whose
+    counter has that value, as in CANopenNode.
     """
 
     __slots__ = ("_left", "_period", "_start")
@@ -239,7 +248,10 @@ class SynchronousCyclic(TpdoMode):
 
 
 class RtrSynchronous(TpdoMode):
-    """Type 252: the TPDO is sampled with SYNC and at the start, and sent on a remote frame."""
+    """Transmission type 252: a remote frame is answered with the data sampled at the latest SYNC.
+
+    Before the first SYNC the data are those at the start of the PDO.
+    """
 
     synchronous: ClassVar[bool] = True
 
@@ -257,10 +269,11 @@ class RtrSynchronous(TpdoMode):
 
 
 class EventDriven(TpdoMode):
-    """Types 254 and 255: the TPDO is sent at the start, on an event and by the event timer.
+    """Transmission types 254 and 255: the TPDO is sent on an event and by the event timer.
 
-    The next transmission waits until the inhibit time has passed since the last transmission. The
-    TPDO then has the newest data.
+    It is also sent at the start. After a transmission the next one waits until the inhibit time has
+    passed. The TPDO then
+    contains the newest data.
     """
 
     timed: ClassVar[bool] = True
@@ -278,7 +291,10 @@ class EventDriven(TpdoMode):
             self.sender.wake(self.due_us)
 
     def run(self, now_us: int) -> None:
-        """Send, or wait for the end of the inhibit time or of another event timer."""
+        """Send the TPDO if the inhibit time is over; otherwise wait for its end.
+
+        If only the event timer was changed, it is restarted.
+        """
         if self._retimed and not self._marked:
             self._time_anew(now_us)
         elif now_us < self._free_us:

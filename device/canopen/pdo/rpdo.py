@@ -65,7 +65,10 @@ class Rpdo(Part):
 
     @property
     def reconfigures(self) -> bool:
-        """Whether the RPDO may write a communication object, as an MPDO or by its mapping."""
+        """Whether the RPDO can change communication objects, and so the slave's CAN-IDs.
+
+        That is so for an MPDO, and for an RPDO with a mapped communication object.
+        """
         entries = (slot.entry for slot in self.mapping.slots())
         return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(
             entry is not None and entry.index in COMMUNICATION_AREA for entry in entries
@@ -77,9 +80,10 @@ class Rpdo(Part):
         return self.parameters.transmission_type in SYNCHRONOUS
 
     def listen(self) -> Handler | None:
-        """Prepare to receive.
+        """Prepare the RPDO to receive frames.
 
-        Return the handler of the frames, or None if the RPDO does not exist.
+        Returns:
+            The handler of its frames, or None if the RPDO does not exist.
         """
         target = self._target() if self.parameters.valid else None
         if target is None:
@@ -192,11 +196,11 @@ _SYNCHRONOUS_WINDOW_LENGTH: Final = 0x1007
 
 
 class PdoConsumer(Service):
-    """Receives PDOs in Operational.
+    """Receives the RPDOs of a slave in Operational, and writes their data to the mapped objects.
 
-    On SYNC, the synchronous RPDOs of the cycle are written to their objects at once, in the order
-    of their numbers, before the synchronous TPDOs of the same SYNC are made. The order of the
-    frames on the wire decides which RPDOs come before the SYNC, also within a tick.
+    Synchronous RPDOs are kept until the next SYNC. On SYNC they are written to their objects in the
+    order of their numbers, before the synchronous TPDOs of the same SYNC are made. The order of the
+    frames on the bus decides which RPDOs come before the SYNC, also within a tick.
 
     Attributes:
         rpdos: RPDOs that the dictionary has.

@@ -62,9 +62,10 @@ _RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
 
 
 class Tpdo(Part):
-    """Sends the mapped objects according to its transmission type.
+    """A TPDO of a slave: sends its mapped objects according to its transmission type.
 
-    The mode of the TPDO uses the TPDO as sender, by `parameters`, `pack`, `send` and `wake`.
+    The transmission type is a `TpdoMode`, which decides when to send. It uses `parameters`, `pack`,
+    `send` and `wake` of the TPDO.
 
     Args:
         producer: service that the TPDO belongs to.
@@ -210,7 +211,14 @@ class PdoProducer(Service):
         node.sync_handlers.append(self._sync)
 
     def request(self, number: int) -> None:
-        """Raise an event for a TPDO, which is sent now (types 254, 255) or with SYNC (type 0)."""
+        """Raise an event for a TPDO.
+
+        A TPDO of type 254 or 255 is then sent as soon as its inhibit time allows, and a TPDO of
+        type 0 with the next SYNC.
+
+        Args:
+            number: number of the TPDO, 1..512.
+        """
         for tpdo in self.tpdos:
             if tpdo.number == number:
                 tpdo.mode.request()
@@ -222,7 +230,9 @@ class PdoProducer(Service):
                 tpdo.mode.request()
 
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:  # noqa: D417
-        """Write an object of other nodes by the first MPDO in destination address mode.
+        """Write an object of another node with an MPDO in destination address mode.
+
+        The first such MPDO of the slave is used. Without one, nothing is sent.
 
         Args:
             node_id: node-ID of the destination, or 0 for all nodes.

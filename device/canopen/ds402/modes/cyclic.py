@@ -72,15 +72,15 @@ class _LatchedSetPoint(Mode):
 
 
 class CyclicPosition(_LatchedSetPoint):
-    """Moves to the target position within an interpolation period, on a straight line.
+    """Cyclic synchronous position mode (csp): moves to the target position on a straight line.
 
-    A SYNC begins a new line. Without SYNC, another target begins a new line, too. At the end of the
-    line the motion stops.
+    The motion takes one interpolation period and then stops. Each SYNC begins a new line to the
+    present target. Without SYNC, a new target begins a new line.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
 
     Attributes:
-        rests: whether a line of length 0 counts as a line that has ended.
+        rests: whether the mode counts as idle when the target is the present position.
     """
 
     shows_following_error = True
@@ -134,11 +134,12 @@ class CyclicPosition(_LatchedSetPoint):
 
 
 class InterpolatedPosition(CyclicPosition):
-    """Moves to the data record 60C1h:01 within an interpolation period, on a straight line.
+    """Interpolated position mode (ip): moves to the data record 60C1h:01 on a straight line.
 
-    The axis moves while bit 4 of the controlword is set. Bit 12 of the statusword is then set.
-    Otherwise the axis brakes with the profile deceleration. A SYNC begins a new line. Without SYNC,
-    another record begins a new line, too. Bit 10 is set when the line has ended.
+    The axis moves while bit 4 of the controlword is set, and bit 12 of the statusword is then set.
+    Otherwise the axis brakes with the profile deceleration. Each motion takes one interpolation
+    period, and bit 10 is set at its end. Each SYNC begins a new line. Without SYNC, a new record
+    begins a new line.
 
     Not emulated: a buffer of records (60C4h); sub-modes other than 0 (60C0h).
     """
@@ -172,7 +173,10 @@ class InterpolatedPosition(CyclicPosition):
         return settled
 
     def ahead(self) -> Line | None:
-        """Return None: the statusword changes on the way, so each step needs a call of `step`."""
+        """Return None, because the motion cannot be computed ahead.
+
+        The statusword changes during the motion, so each step needs a call of `step`.
+        """
         return None
 
     def halt(self, now_us: int) -> bool:
@@ -182,10 +186,10 @@ class InterpolatedPosition(CyclicPosition):
 
 
 class CyclicVelocity(Mode):
-    """Reaches the target velocity at the end of an interpolation period, on a straight ramp.
+    """Cyclic synchronous velocity mode (csv): ramps the velocity evenly to the target velocity.
 
-    When the mode is chosen while the drive is enabled, the target velocity becomes the velocity
-    of the reference.
+    The ramp takes one interpolation period. When the mode is chosen while the drive is enabled, the
+    present velocity of the reference becomes the target velocity, so that the motion continues.
     """
 
     control: ClassVar[Control] = Control.VELOCITY

@@ -22,15 +22,17 @@ class Switch(IntFlag):
 
 
 class HomingMethod(NamedTuple):
-    """A homing method: where home is and how to find it.
+    """A homing method of CiA 402: how the drive searches for home, and where home is.
 
     Attributes:
         switch: switch whose edge is searched, or None if the method uses no switch.
-        first: direction of the search when the switch is not active.
-        approach: direction in which the axis crosses the edge, then the index pulse, at the end.
+        first: direction of the search while the switch is not active: -1 or +1.
+        approach: direction in which the axis finally crosses the edge and then searches for the
+            index pulse: -1 or +1.
         active: whether the switch is active after the edge, in the direction of `approach`.
         turns: whether the search reverses at the limit switch of its first direction.
-        by_index: whether home is the next index pulse after the edge.
+        by_index: whether home is the first index pulse after the edge. Otherwise home is the edge
+            itself.
     """
 
     switch: Switch | None
@@ -94,16 +96,16 @@ class Phase(Enum):
 
 
 class HomingSearch(Part):
-    """Searches for home with a method.
+    """The search for home with one homing method, advanced by one control step at a time.
 
-    The axis always crosses the edge slowly at the end. If it hits the switch during the search,
-    or cannot brake within a narrow switch, it moves back first. Therefore home is the same
-    position from every start. An edge counts only while the axis moves as demanded.
+    The axis always crosses the edge of the switch slowly at the end. If it meets the switch during
+    the search, or cannot brake within a narrow switch, it moves back first. Therefore home is the
+    same position from every start. An edge counts only while the axis moves as demanded.
 
     Attributes:
         method: the homing method.
-        phase: phase of the search.
-        direction: direction of the motion: -1 or +1, or 0 to stop.
+        phase: present phase of the search.
+        direction: demanded direction of the motion: -1 or +1, or 0 to stop.
     """
 
     def __init__(self, method: HomingMethod, switches: Switch) -> None:
@@ -124,13 +126,13 @@ class HomingSearch(Part):
         return self.phase in (Phase.FOUND, Phase.FAILED)
 
     def step(self, switches: Switch, moving: int, *, crawling: bool, index: bool) -> None:
-        """Update the search with the switches of one control step.
+        """Advance the search by one control step.
 
         Args:
-            switches: the active switches.
+            switches: switches that are active in this step.
             moving: sign of the demanded velocity.
-            crawling: whether the demanded velocity is at most the slow speed.
-            index: whether the index pulse has come since the last step.
+            crawling: whether the demanded velocity is at most the slow speed of homing.
+            index: whether the encoder has passed an index pulse since the last step.
         """
         before, self._before = self._before, switches
         wrong_limit = _LIMIT[-moving] & switches & ~before
@@ -315,7 +317,12 @@ class Homing(Mode):
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:
-    """Return the first index pulse between two positions in counts, or None if there is none.
+    """Return the position of the first index pulse that the encoder passes in a motion, or None.
+
+    Args:
+        before: position at the start of the motion, in counts.
+        after: position at the end of the motion, in counts.
+        per_turn: number of counts from one index pulse to the next.
 
     >>> index_pulse(1990, 2010, 2000), index_pulse(2000, 2010, 2000), index_pulse(1, 0, 2000)
     (2000, None, 0)

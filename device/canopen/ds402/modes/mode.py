@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 
 class ModeBit(IntEnum):
-    """Bits of the statusword that a mode sets.
+    """Bits of the statusword whose meaning depends on the mode of operation.
 
-    An `IntEnum` uses the operators of `int`. Those of a flag take 20 times as long.
+    The class is an `IntEnum` because the operators of `int` are 20 times as fast as those of a
+    flag.
     """
 
     TARGET_REACHED = Statusword.TARGET_REACHED
@@ -32,13 +33,13 @@ class DriveView:
     """The parts of a drive that its modes of operation use.
 
     Attributes:
-        parameters: objects of the drive, with defaults.
-        axis: motor, reference, settings and zero.
+        parameters: objects of the drive, with defaults for missing objects.
+        axis: axis with its motor, its reference and its settings.
         switches: limit switches and home switch.
         limits: limits of the axis.
         stopping: object that brakes according to the option codes.
         controlword: the latest controlword.
-        fresh: whether a SYNC has come or a target has changed since the last step.
+        fresh: whether a SYNC has arrived or a target has changed since the last step.
     """
 
     parameters: Parameters
@@ -89,11 +90,11 @@ class Mode(Part):
         return self._parameters.number(index, sub)
 
     def enter(self, *, enabled: bool) -> None:
-        """Start the mode.
+        """Start this mode of operation, either when it is chosen or when the drive is enabled.
 
         Args:
-            enabled: whether the mode was chosen in Operation enabled. False means that the drive is
-                just being enabled.
+            enabled: whether the drive was already in Operation enabled when the mode was chosen.
+                False means that the drive is just being enabled.
         """
 
     def start(self) -> None:
@@ -103,7 +104,7 @@ class Mode(Part):
         """Act on the falling edge of bit 4 of the controlword."""
 
     def step(self, now_us: int) -> bool:
-        """Run one control period of the mode, or of a halt.
+        """Run one control period of the mode, or brake if the controlword demands a halt.
 
         Returns:
             True if the mode is idle until its inputs change.
@@ -117,11 +118,13 @@ class Mode(Part):
         return self.halt(now_us)
 
     def ahead(self) -> Line | None:
-        """Return the motion of the reference in the next steps if no input changes.
+        """Return the demanded motion of the next steps if no input changes, or None if unknown.
+
+        A drive uses it to compute several ticks at once.
 
         Returns:
-            The line and the limits at which it ends, such as a limit that would cut the motion, or
-            None if each step needs a separate call of `step`.
+            The line, with the largest velocity at which it may continue, or None if each step needs
+            a separate call of `step`.
         """
         return None
 
@@ -155,10 +158,10 @@ class Mode(Part):
 
 
 class Window(Part):
-    """Detects a condition that has been true for long enough: windows and thresholds.
+    """Detects that a condition has been true for a given time, as for "target reached".
 
     Attributes:
-        waiting: whether the condition is true and the time runs.
+        waiting: whether the condition is true, but not yet for long enough.
     """
 
     __slots__ = ("_since_us", "waiting")

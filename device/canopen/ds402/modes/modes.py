@@ -132,7 +132,12 @@ MODES: Final[dict[int, type[Mode]]] = {
 
 
 def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[Mode]]:
-    """Return the modes that a dictionary lists in its 6502h, or all modes if it lists none.
+    """Return those modes of operation that the drive supports according to its object 6502h.
+
+    Args:
+        modes: all modes by their number. A mode of a manufacturer has a negative number and is
+            always returned.
+        listed: value of 6502h, or 0 to return all modes.
 
     >>> sorted(offered(MODES, 0b101))
     [0, 1, 3]
