@@ -14,7 +14,9 @@ _LANES: Final = 256
 
 
 class Chance(Part):
-    """A seeded generator of integers (SplitMix64: Steele, Lea, Flood 2014).
+    """A seeded random generator, whose numbers are the same in each run with the same seed.
+
+    The numbers are integers of 64 bits (SplitMix64: Steele, Lea, Flood 2014).
 
     Args:
         seed: seed of the run.
@@ -45,11 +47,14 @@ class Chance(Part):
         return self.draw() < threshold
 
     def hits(self, threshold: int, draws: int) -> list[int]:
-        """Draw several times as `hit` does; return the indices of the draws that hit, from 0.
+        """Make many random decisions at once, with the same results as calls of `hit`.
 
         Args:
-            threshold: value of `threshold_of`.
-            draws: number of draws, 0 or more.
+            threshold: value of `threshold_of`, which stands for the probability of a hit.
+            draws: number of decisions, 0 or more.
+
+        Returns:
+            The indices of the decisions that are hits, counted from 0.
         """
         found: list[int] = []
         for first in range(0, draws, _LANES):  # side by side: a fifth of the time of calls of `hit`
@@ -81,6 +86,11 @@ def threshold_of(rate: float) -> int:
 
 
 def check_rate(name: str, rate: float) -> None:
-    """Raise ValueError unless the rate of a fault is above 0 and at most 1."""
+    """Raise ValueError unless the rate of a fault is above 0 and at most 1.
+
+    Args:
+        name: name of the fault, for the message.
+        rate: probability of the fault, for example for each byte.
+    """
     if not 0 < rate <= 1:
         raise ValueError(f"{name} takes a rate above 0 and up to 1, as {name}=0.01; got {rate:g}")

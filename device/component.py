@@ -38,11 +38,12 @@ Result = DeviceReturnCode | None
 
 
 class DeviceComponent(Copyable):
-    """A component on a device; a subclass defines its properties and callbacks.
+    """Base class of RT components that run on a device, such as a CANopen node.
 
-    Declare ports as attributes of the class; each component gets its own ports. Callbacks are
-    optional. Declare a callback that cannot fail as `-> None`; a callback that can fail returns
-    `ERROR`. Power-on makes a new component, so values kept in `self` behave like the device's RAM.
+    A subclass declares ports as attributes of the class, and each component gets its own copies of
+    them. Callbacks are optional. Declare a callback that cannot fail as `-> None`. A callback that
+    can fail returns `ERROR`. Power-on makes a new component, so attributes of `self` behave like
+    the device's RAM.
 
     Attributes:
         type_name: type of the component.
@@ -90,13 +91,13 @@ C = TypeVar("C", bound=DeviceComponent)
 
 
 class CallbackRunner(Generic[C]):
-    """Runs the callbacks of a component, and counts them.
+    """Calls the callbacks of a component by name, and counts the calls.
 
     Attributes:
         component: the component.
         latest: name of the callback that ran last, or empty before the first callback.
-        calls: number of callbacks that ran.
-        executed: number of `on_execute` callbacks among these calls.
+        calls: number of calls of all callbacks.
+        executed: number of calls of `on_execute` among these.
     """
 
     def __init__(self, component: C) -> None:
@@ -114,14 +115,14 @@ class CallbackRunner(Generic[C]):
 
 @dataclass(slots=True)
 class Timer:
-    """A timer as execution context (RTC-Lite type 22h, DeviceRTC).
+    """A timer that calls `on_execute` of a component periodically (RTC-Lite type 22h, DeviceRTC).
 
     The periods are counted from the start of the timer, so the timer does not drift. Missed periods
     are skipped.
 
     Attributes:
         rate_hz: number of periods in a second. A new rate applies from the next start.
-        due_us: time at which the next period ends, or `NEVER` while the timer is stopped.
+        due_us: time at which the present period ends, or `NEVER` while the timer is stopped.
     """
 
     rate_hz: int
@@ -156,7 +157,16 @@ class Timer:
 
 
 def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
-    """Yield the attributes of one kind that a class and its bases define, the bases first.
+    """Yield the attributes of a class that have a given type, such as the ports of a component.
+
+    Attributes of base classes come first.
+
+    Args:
+        owner: class whose attributes are searched.
+        kind: type of the attributes.
+
+    Yields:
+        The name and the value of each attribute.
 
     >>> class Lamp:
     ...     bright, name = 5, "lamp"
@@ -170,7 +180,10 @@ def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
 
 
 def shown(value: Any) -> float | str:
-    """Return the value of a port as an output, with booleans as numbers and sequences as text."""
+    """Return the value of a port in the form in which panels and scenario files show it.
+
+    A boolean becomes a number, and a sequence becomes a text with blanks.
+    """
     if isinstance(value, tuple):
         return " ".join(str(shown(element)) for element in value)
     return int(value) if isinstance(value, bool) else value

@@ -19,11 +19,11 @@ class Device(Protocol[W]):
 
     @property
     def due_us(self) -> int:
-        """The earliest time at which anything happens without input.
+        """The earliest time at which the device does anything without new input, in microseconds.
 
-        A rig in virtual time jumps to this time. A time in the past means that the next tick does
-        the work. `NEVER` means that nothing happens without input. A tick before this time, without
-        traffic, must have no visible effect.
+        A rig in virtual time jumps to this time, so a tick before it without traffic must have no
+        visible effect. A time in the past means that the next tick does the work. `NEVER` means
+        that nothing happens without input.
 
         `due_us` may become earlier in `tick` and `reset`, and by changes between steps, such as
         inputs or a write to the dictionary. A rig reads it again at each call that advances the
@@ -35,15 +35,15 @@ class Device(Protocol[W]):
         """Power-on reset: erase all state except the configuration and the physical inputs."""
 
     def tick(self, now_us: int, rx: W, /) -> W:
-        """Advance by one tick.
+        """Advance the device by one tick.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: traffic that has arrived since the last tick, in wire order.
+            rx: traffic that has arrived since the last tick, in the order of the wire.
 
         Returns:
-            The traffic that the device sends in this tick, in wire order. The device answers bad
-            input as the real device does, and never raises.
+            The traffic that the device sends in this tick, in the order of the wire. The device
+            answers bad input as the real device does, and never raises.
         """
         ...
 
@@ -53,7 +53,7 @@ class UartDevice(Device[bytes], Protocol):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of the UART after the latest tick or `reset`, or None without a UART.
+        """Setting of the device's UART after the latest tick or `reset`, or None without a UART.
 
         The result of a tick is still sent with the setting that was valid before that tick. The new
         setting applies after the last stop bit of that result. From then on the device also

@@ -9,7 +9,9 @@ from tickrig.device.twin import Part
 
 @dataclass
 class Horizon(Part):
-    """Time limits of a rig, shared with its devices that have an attribute `horizon`.
+    """Times up to which a device may compute its ticks ahead.
+
+    A rig shares the object with its devices that have an attribute `horizon`.
 
     Attributes:
         passed_us: time up to which all ticks are done.

@@ -19,7 +19,9 @@ _WORD: Final = 0x1_0000
 
 @dataclass(frozen=True, slots=True)
 class Register(Immutable):
-    """A number that a master can read.
+    """Description of a number that a Modbus master can read from the device.
+
+    A number occupies one or two consecutive registers.
 
     Attributes:
         address: address of the first register of the number.
@@ -45,15 +47,15 @@ class Register(Immutable):
 
 
 class Registers(Part):
-    """The numbers of a device.
+    """The registers of a Modbus device, with the numbers that they contain.
 
     A number of 32 bits must be written as a whole. Writing half of it is refused as an illegal
     address.
 
     Args:
-        table: description of the numbers.
-        measured: functions by name of a number. A function computes the number each time a master
-            reads it.
+        table: descriptions of the numbers.
+        measured: functions by name of a number. Such a function computes its number each time a
+            master reads it.
     """
 
     def __init__(
@@ -98,9 +100,14 @@ class Registers(Part):
         return [values[name] >> shift & 0xFFFF for name, shift in self._places]
 
     def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
-        """Write registers; return the numbers that were written, by their names.
+        """Write consecutive registers as a master does. If a register is refused, none is written.
 
-        If a register is refused, none is written.
+        Args:
+            first: address of the first register.
+            values: values of the registers, 16 bits each.
+
+        Returns:
+            The numbers that were written, by their names.
 
         Raises:
             Refusal: a register does not exist or is read-only, only half of a number would be

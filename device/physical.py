@@ -16,10 +16,10 @@ from tickrig.device.twin import Immutable
 
 
 class SignalType(Enum):
-    """Type of a physical input.
+    """Type of a physical input, which decides its values and how a panel shows it.
 
     Attributes:
-        LEVEL: a quantity, such as a stick, a voltage or a load.
+        LEVEL: a quantity, such as the position of a stick, a voltage or a load.
         BUTTON: button, whose value is 1 while the button is pressed.
         TEXT: text, or bytes in hex.
         FAULT: physical fault, whose value is 1 while the fault is present.
@@ -33,7 +33,7 @@ class SignalType(Enum):
 
 @dataclass(frozen=True, slots=True)
 class InputSignal(Immutable):
-    """A physical input.
+    """Description of a physical input: what a user or the surroundings can change at the device.
 
     Attributes:
         name: name in scenario files and panels.
@@ -44,8 +44,8 @@ class InputSignal(Immutable):
         unit: unit of the value, or empty for a plain number.
         initial: value at the start of the rig.
         real: whether the input accepts fractions. A device keeps such an input in a `QuantityBank`.
-        counts: three numbers of the converter, or empty without a converter: counts of its object
-            at `low`, counts at `high`, and counts of one step.
+        counts: three numbers of the analogue converter: counts of its object at `low`, counts at
+            `high`, and counts of one step. Without a converter the tuple is empty.
     """
 
     name: str
@@ -61,7 +61,7 @@ class InputSignal(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class OutputSignal(Immutable):
-    """A physical output: a property of the device that an observer can see.
+    """Description of a physical output: a property of the device that an observer can see.
 
     Attributes:
         name: name in scenario files and panels.
@@ -76,13 +76,14 @@ class OutputSignal(Immutable):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class QuantityBank:
-    """The values of a device's physical inputs: whole numbers, or fractions if `real` is set.
+    """The present values of all physical inputs of a device.
 
+    A value is a whole number, or may have a fraction if the input has `real` set.
     `bank["supply_v"]` is the present value. A change takes effect at the device's next tick.
 
     Args:
-        table: the inputs.
-        groups: names that set several inputs together, such as `stick`.
+        table: descriptions of the inputs.
+        groups: names of inputs that are set together, by name of the group, such as `stick`.
         on_change: function that is called after each change.
 
     Attributes:
@@ -118,11 +119,11 @@ class QuantityBank:
         return self._values[name]
 
     def set(self, name: str, value: int | float | str) -> None:
-        """Set an input.
+        """Set the value of a physical input.
 
         Args:
             name: name of the input.
-            value: the new value, in its unit and range.
+            value: the new value, in the unit and range of the input.
 
         Raises:
             ValueError: the input is unknown, or the value is a wrong kind of number or out of
@@ -134,7 +135,7 @@ class QuantityBank:
             self._on_change()
 
     def check(self, name: str, value: int | float | str) -> int | float:
-        """Check a value without setting it.
+        """Check whether `set` would accept a value, without setting it.
 
         Args:
             name: name of the input.
@@ -158,7 +159,7 @@ class QuantityBank:
         return value
 
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
-        """List the inputs of a type.
+        """Return the names of the inputs of one type, such as all buttons.
 
         Args:
             signal_type: type of the inputs.
@@ -169,11 +170,11 @@ class QuantityBank:
         return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Look up the description of an input.
+        """Return the description of an input.
 
         Args:
             name: name of the input.
-            signal_type: required type, if given.
+            signal_type: required type of the input, or None for any type.
 
         Returns:
             The description of the input.
@@ -191,13 +192,13 @@ class QuantityBank:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class InputBank(QuantityBank):
-    """The values of a device whose physical inputs are all whole numbers.
+    """The present values of the physical inputs of a device, if all of them are whole numbers.
 
     `bank["button"]` is the present value. A change takes effect at the device's next tick.
 
     Args:
-        table: the inputs.
-        groups: names that set several inputs together, such as `stick`.
+        table: descriptions of the inputs.
+        groups: names of inputs that are set together, by name of the group, such as `stick`.
         on_change: function that is called after each change.
 
     Attributes:

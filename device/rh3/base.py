@@ -58,7 +58,9 @@ _HALF: Final = 2.0**63
 
 
 class Ground(Part):
-    """Converts the turning of two wheels into motion over the ground, on exact arcs.
+    """The contact of a two-wheeled base with the ground: converts turning wheels into motion.
+
+    The path in each millisecond is an exact arc.
 
     Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
 
@@ -96,11 +98,11 @@ class Ground(Part):
         return not (self.speed_m_s or self.turn_rad_s or self.left.slip_m_s or self.right.slip_m_s)
 
     def roll(self, lefts: Sequence[float], rights: Sequence[float]) -> None:
-        """Advance by some milliseconds.
+        """Move the base over the ground for some milliseconds.
 
         Args:
-            lefts: numbers of counts by which the left wheel turned in each millisecond.
-            rights: numbers of counts by which the right wheel turned in each millisecond.
+            lefts: turning of the left wheel in each millisecond, in counts of the encoder.
+            rights: turning of the right wheel in each millisecond, in counts of the encoder.
         """
         left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
         grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
@@ -242,7 +244,7 @@ class Rh3Base(Copyable):
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -256,7 +258,7 @@ class Rh3Base(Copyable):
         return _READ[name](self._seen)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Advance to now.
+        """Advance the base by one tick, or by several ticks that were skipped.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

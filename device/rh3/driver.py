@@ -219,15 +219,15 @@ class Driver(Part):
             self._waiting.append((self.now_us + self._delay_us, values))
 
     def step(self, last_request_us: int, until_us: int) -> _Pair:
-        """Run the millisecond of `now_us`, and the uneventful milliseconds after it.
+        """Run both wheels for one millisecond, and for following milliseconds without any change.
 
         Args:
-            last_request_us: time of the latest request.
-            until_us: time of the last millisecond. `now_us` becomes the time of the last
-                millisecond that was run.
+            last_request_us: time of the latest request of the master.
+            until_us: time up to which milliseconds may be run. `now_us` becomes the time of the
+                last millisecond that was run.
 
         Returns:
-            The speeds of the wheels in each millisecond, in counts/ms.
+            The speeds of the left and the right wheel in each millisecond, in counts/ms.
         """
         if self._waiting:
             self._take_waiting()

@@ -159,12 +159,15 @@ class _SpeedLoop(Part):
         return not (self.reference or self._error or self._change or self.counted)
 
     def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
-        """Run a wheel for some milliseconds; return its speed in each millisecond, in counts/ms.
+        """Run a wheel under speed control for some milliseconds.
 
         Args:
             wheel: wheel with its load and faults.
             target: target speed in counts/ms.
             steps: number of milliseconds.
+
+        Returns:
+            The speed of the wheel in each millisecond, in counts/ms.
         """
         # one loop over locals takes half the time of a call for each part
         vp, vi, vd, ramp = self._vp, self._vi, self._vd, self._ramp
@@ -214,7 +217,7 @@ _INT32: Final = 2**32
 
 
 class Side(Part):
-    """A wheel, its encoder counter and its servo.
+    """One side of the base: a wheel, its encoder counter and its servo.
 
     Args:
         name: `left` or `right`.
@@ -225,10 +228,10 @@ class Side(Part):
     Attributes:
         name: name of the side: `left` or `right`.
         wheel: mechanics of the wheel.
-        fault: reason for which the side was switched off.
+        fault: reason for which the driver switched this wheel off.
         clipped: whether the target was above the speed limit.
-        stalled: whether full torque has not moved the wheel for too long, and this is not handled
-            yet.
+        stalled: whether full torque has not moved the wheel for too long, and the driver has not
+            yet reacted to it.
     """
 
     def __init__(
@@ -334,13 +337,16 @@ class Side(Part):
             self.stalled = False
 
     def drive(self, steps: int, *, stop: bool, to_position: bool) -> list[float]:
-        """Run towards the targets; return the speed in each millisecond, in counts/ms.
+        """Drive the wheel towards its target for some milliseconds.
 
         Args:
-            steps: number of milliseconds, which is 1 towards a position, or while the wheel is
-                `stalling`.
+            steps: number of milliseconds. It must be 1 if the target is a position, or while the
+                wheel is `stalling`.
             stop: whether the target is standstill.
             to_position: whether the target is a position. Otherwise the target is a speed.
+
+        Returns:
+            The speed of the wheel in each millisecond, in counts/ms.
         """
         loop, wheel, limit = self._speed_loop, self.wheel, self._speed_loop.limit
         if stop:

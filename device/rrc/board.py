@@ -82,7 +82,10 @@ OUTPUTS: Final = {
 
 
 def new_inputs() -> InputBank:
-    """Return the inputs of a new RRC with supply, full battery and everything at rest."""
+    """Return the physical inputs of an RRC at the start.
+
+    The supply is on, the battery is full, and the stick and all buttons are at rest.
+    """
     return InputBank(INPUTS, groups={"stick": ("stick_v_pct", "stick_w_pct")})
 
 
@@ -94,12 +97,12 @@ _SHOWN_PERIODS: Final = 10
 
 @dataclass(slots=True)
 class LoadAccount:
-    """Work left over from past periods, in per cent of a period.
+    """Account of the processor's work in an RRC, which shows when the RRC cannot keep up.
 
-    Each received line feed costs work, whatever happens to its line. Bytes that an overflow
-    discards cost work, too. Two commands and a status line take exactly one period, so the backlog
-    stays constant. Two OK lines in addition exceed the period by 30 %, and VR2 stops in the tenth
-    such tick.
+    Work that exceeds a period of 10 ms is left over for the next one. Each received line feed costs
+    work, whatever happens to its line, and so do bytes that an overflow discards. Two commands and
+    a status line take exactly one period, so the backlog stays constant. Two OK lines in addition
+    exceed the period by 30 %, and VR2 stops in the tenth such tick.
 
     Attributes:
         backlog_pct: work that is left over, in per cent of a period.
@@ -126,10 +129,10 @@ class LoadAccount:
     def spend(
         self, line_feeds: int, overflows: int, replies: int, *, status: bool, extra_pct: int
     ) -> None:
-        """Account for one period in which VR2 runs.
+        """Add the work of one period in which VR2 runs, and subtract the time of the period.
 
         Args:
-            line_feeds: received line feeds.
+            line_feeds: number of received line feeds.
             overflows: number of overflows of the receive buffer, plus one for each 256 further
                 discarded bytes.
             replies: number of lines sent, except overflow errors and the status line.
@@ -156,11 +159,11 @@ _ALARM_TICKS: Final = 50
 
 @dataclass(slots=True)
 class Buzzer:
-    """The buzzer, tick by tick.
+    """The buzzer of the RRC, which plays patterns of the host and the automatic alarm.
 
     Attributes:
-        sounding: whether it sounded in the latest tick.
-        changes_at: the next tick at which `sounding` may change without input.
+        sounding: whether the buzzer sounded in the latest tick.
+        changes_at: number of the next tick at which `sounding` may change without input.
     """
 
     sounding: bool = False
@@ -168,9 +171,13 @@ class Buzzer:
     _phases: deque[tuple[int, bool]] = field(default_factory=deque, init=False)  # (end, on)
 
     def play(self, tick: int, times: tuple[int, ...]) -> None:
-        """Play on and off times in ticks from the next tick on, and drop the present pattern.
+        """Start a pattern of the host in the next tick. It replaces the present pattern.
 
-        A zero time skips its phase. If all times are zero, the buzzer is silent (DECISION R24).
+        If all times are zero, the buzzer is silent (DECISION R24).
+
+        Args:
+            tick: number of the present tick.
+            times: times in ticks, alternately on and off. A zero time skips its phase.
         """
         self._phases.clear()
         # A pattern begins in the tick after its command (R24). The first phase is silent and ends
@@ -187,7 +194,7 @@ class Buzzer:
         self._phases.clear()
 
     def tick(self, tick: int, alarm_since: int | None) -> None:
-        """Sound or rest in this tick.
+        """Compute whether the buzzer sounds in this tick.
 
         Args:
             tick: number of the tick.
@@ -239,7 +246,10 @@ class PowerSequence:
         self._faults.clear()
 
     def step(self, state: RrcState, tick: int, inputs: InputBank) -> Step:
-        """Check the physical inputs, once a tick; in Initialize the button has no effect yet."""
+        """Check once a tick whether a button, a fault or the time changes the state of the RRC.
+
+        In the state Initialize the power button has no effect yet.
+        """
         if state is RrcState.INITIALIZE and self._since is not None:
             return self._waiting(state, tick - self._since, inputs)
         # An edge counts, not a level: a button that is held from one state into the next acts once.

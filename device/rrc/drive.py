@@ -21,11 +21,11 @@ _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 
 
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
-    """Count button edges and apply the speed buttons.
+    """Count presses and releases of the speed and alarm buttons, and change the speed mode.
 
-    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So an edge has occurred
-    when the parity of the counter differs from the button. Edges count whether or not the lock is
-    on (DECISION R23).
+    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So a button has changed
+    when the parity of its counter differs from its state. The counters change whether or not the
+    speed buttons are locked (DECISION R23).
 
     Returns:
         True if the alarm button has just been pressed.
@@ -70,12 +70,15 @@ class Gear(Enum):
 
 @dataclass(slots=True)
 class Gearbox:
-    """Gear of modes 2 and 3, chosen by the direction in which the stick leaves neutral.
+    """The gear that the RRC imitates in reverse modes 2 and 3.
+
+    The direction in which the stick leaves neutral chooses the gear.
 
     Attributes:
         gear: the gear after the latest tick.
-        reversed_at: tick at which gear R was chosen. The automatic alarm counts from this tick.
-        resets_at: tick at which the gear is disengaged if the stick stays in neutral.
+        reversed_at: number of the tick at which gear R was chosen. The automatic alarm counts from
+            this tick.
+        resets_at: number of the tick at which the gear is disengaged if the stick stays in neutral.
     """
 
     gear: Gear = Gear.NEUTRAL
@@ -89,14 +92,14 @@ class Gearbox:
     def drive(
         self, tick: int, mode: int, stick: tuple[int, int], shaped: tuple[int, int], knobs: Joystick
     ) -> tuple[int, int]:
-        """Return translation and rotation of one tick in reverse mode 0 to 3.
+        """Return the translation and rotation that the gear allows in one tick.
 
         Args:
             tick: number of the tick.
-            mode: reverse mode, from #7 of the command or from the buttons.
+            mode: reverse mode 0 to 3, from #7 of the command or from the buttons.
             stick: translation and rotation as received, which choose the gear.
-            shaped: translation and rotation after shaping, which drive the motors (DECISION R18).
-            knobs: values #8 to #10 of the command `joystick`.
+            shaped: translation and rotation after `shape`, which drive the motors (DECISION R18).
+            knobs: the command `joystick`, whose values #8 to #10 are used.
         """
         v_pct, w_pct = shaped
         if mode == 0:
@@ -178,7 +181,13 @@ def _shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
 
 
 def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
-    """Shape one axis, -100..100 %, and keep the sign (RRC manual, `joystick` #1 to #6).
+    """Apply dead zone and curve to one axis of the stick (RRC manual, `joystick` #1 to #6).
+
+    Args:
+        value_pct: position of the stick, -100..100 %. The result has the same sign.
+        low_pct: largest value that counts as 0, 0..99 %.
+        high_pct: smallest value that counts as 100 %, above `low_pct`, at most 100 %.
+        exponent: exponent of the curve, 0..15. The power is 1 + 0.1 * exponent.
 
     >>> shape(-50, 0, 100, 5)
     -35
@@ -188,11 +197,12 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 
 
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
-    """Return translation and rotation within the limits, with their signs (RRC manual, `limit`).
+    """Return translation and rotation within the limits of a `limit` command, with their signs.
 
     First each input is limited to its own limit. Then both values are multiplied by one common
-    factor, which keeps the direction. It is the smallest of the factors that the limits of sum,
-    product and radius require. All arithmetic is integer and rounds down (DECISION R19).
+    factor, which keeps the direction of travel. It is the smallest of the factors that the limits
+    of sum, product and radius require (RRC manual, `limit`). All arithmetic is integer and rounds
+    down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)
@@ -213,12 +223,12 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
 
 @dataclass(slots=True)
 class Drive:
-    """Translation and rotation for the motors (DECISION R18).
+    """Computes translation and rotation for the motors in each tick (DECISION R18).
 
     Attributes:
         out_pct: translation and rotation of the latest tick, -100..100 %.
         gearbox: the imitated gear change.
-        by_stick: whether the stick drives.
+        by_stick: whether the stick drives the motors.
     """
 
     out_pct: tuple[int, int] = (0, 0)

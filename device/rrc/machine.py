@@ -83,7 +83,7 @@ from tickrig.wire.rrc.replies import StatusA
 
 @dataclass(slots=True)
 class ReceiveBuffer:
-    """Received bytes that wait to be processed, split into lines (DECISION R27).
+    """Buffer for received bytes that wait to be processed, split into lines (DECISION R27).
 
     If a byte does not fit, the buffer drops all waiting bytes. It then discards this byte and all
     following bytes up to the next LF.
@@ -91,7 +91,8 @@ class ReceiveBuffer:
     Attributes:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
-        thrown_blocks: number of further blocks of `size` bytes discarded from such a line.
+        thrown_blocks: number of further blocks of `size` bytes that were discarded after an
+            overflow, in the same line.
     """
 
     size: int
@@ -173,10 +174,10 @@ _STAYS: Final = ((Move.OUTPUT, RrcState.OUTPUT), (Move.LIMIT, RrcState.LIMIT))
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 @dataclass(slots=True)
 class Rrc(Copyable):
-    """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
+    """An emulated RRC (Robotic Relay Communicator) with the VR2 wheelchair around it.
 
-    If `config.vehicle` is set, the wheelchair includes a vehicle; the numbers of the vehicle are
-    our choice (vehicle.py).
+    It is a `Device[bytes]`. If `config.vehicle` is set, the emulation includes the motion of the
+    wheelchair. The numbers of this vehicle are our choice (vehicle.py).
 
     Not emulated: the traffic on the VR2 bus itself, the sound of the alarm button's horn, the USB
     serial driver.
@@ -243,7 +244,7 @@ class Rrc(Copyable):
         self._wipe()
 
     def read(self, name: str, /) -> int | str:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -264,7 +265,7 @@ class Rrc(Copyable):
         return 0 if self.state is RrcState.OFF else PACE_WITHOUT_VR2
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Run one period, in the order of DECISION R28.
+        """Run one period of the RRC, in the order of DECISION R28.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

@@ -39,7 +39,7 @@ _GAUGE_TOP: Final = 10
 
 @dataclass(slots=True)
 class Vehicle:
-    """Speed, path and battery of the vehicle, computed period by period.
+    """The wheelchair as a vehicle: its speed, path and battery, computed period by period.
 
     Args:
         battery_wh: capacity of the battery.
@@ -77,7 +77,7 @@ class Vehicle:
             self.gauge, self.charge = gauge, gauge / _GAUGE_TOP
 
     def step(self, out_pct: tuple[int, int], speed_mode: int, *, running: bool) -> None:
-        """Move for one period of 10 ms.
+        """Move the vehicle for one period of 10 ms, and drain its battery.
 
         Args:
             out_pct: translation and rotation for the motors.

@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 class LitePort(Generic[T]):
-    """Base of in-ports and out-ports.
+    """Base class of the in-ports and out-ports of an RTComponent-Lite.
 
     Args:
         name: name of 1 to 15 printable ASCII characters.
@@ -35,7 +35,7 @@ class LitePort(Generic[T]):
             frame.
 
     Attributes:
-        is_new: whether the value has not been read yet.
+        is_new: whether the value has not been read yet. An out-port is read when its value is sent.
         value: the latest value.
 
     Raises:
@@ -74,7 +74,14 @@ class LiteInPort(LitePort[T]):
         return self.value
 
     def accept(self, data: bytes) -> bool:
-        """Store a value from the wire; if it is invalid, return False and keep the old value."""
+        """Store a value that the proxy has sent.
+
+        Args:
+            data: bytes of the value, as in the frame.
+
+        Returns:
+            False if the bytes are no valid value of the port. The old value is then kept.
+        """
         if not self.fits(data):
             return False
         self.value, self.is_new = self.port_type.decode(data), True
@@ -85,7 +92,10 @@ class LiteOutPort(LitePort[T]):
     """A port that the component writes; new values go to the proxy."""
 
     def write(self, value: T) -> bool:
-        """Store a value; if the value does not fit, return False and keep the previous value.
+        """Set the value of the port, which is then sent to the proxy.
+
+        Returns:
+            False if the value is too long for the port. The previous value is then kept.
 
         Raises:
             ValueError: the value does not have the type of the port.
@@ -97,7 +107,7 @@ class LiteOutPort(LitePort[T]):
         return True
 
     def take(self) -> bytes:
-        """Return the value as sent on the wire, and mark it as no longer new."""
+        """Return the bytes of the value for a frame, and mark the value as no longer new."""
         self.is_new = False
         return self.port_type.encode(self.value)
 
@@ -107,9 +117,10 @@ _MAX_PORTS: Final = 8
 
 
 class LiteComponent(DeviceComponent):
-    """A component on a small device; a subclass defines its properties and callbacks.
+    """Base class of components that run on a small controller (RTComponent-Lite).
 
-    The callbacks are those of Table 1 of the paper.
+    A subclass defines the properties and callbacks. The callbacks are those of Table 1 of the
+    paper.
 
     Attributes:
         type_name: type of the component, with 1 to 15 characters.

@@ -56,10 +56,10 @@ _NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
 
 
 class LiteLifeCycle(CallbackRunner[LiteComponent]):
-    """Runs the callbacks of a component, and tracks its state.
+    """Life cycle of an RTComponent-Lite: executes commands, runs callbacks and keeps the state.
 
     Attributes:
-        state: state of the component.
+        state: present state of the component.
     """
 
     def __init__(self, component: LiteComponent) -> None:

@@ -96,11 +96,11 @@ class RequestDecoder(Protocol):
 
 @dataclass(slots=True)
 class LiteReceiver:
-    """The receiver of the line.
+    """The receive buffer of a node on its serial line, with the decoder of the frames.
 
     Attributes:
         decoder: decoder that reads the frames.
-        dropped: number of bytes dropped because the buffer was full.
+        dropped: number of bytes that were dropped because the buffer was full.
     """
 
     decoder: RequestDecoder
@@ -290,7 +290,7 @@ class RtcLiteNode(Copyable):
         self.inputs.changed = True
 
     def read(self, name: str, /) -> float | str:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -311,7 +311,7 @@ class RtcLiteNode(Copyable):
         return own[name] if name in own else _port_text(life.component, name)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Run one pass of the main loop.
+        """Run one pass of the node's main loop: receive, answer requests, run the timer.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

@@ -22,14 +22,14 @@ DEFAULT_RATE_HZ: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class LiteConfig(Immutable):
-    """Configuration of an emulated node.
+    """Configuration of an emulated RTC-Lite node: its framing, checksum and execution context.
 
     Attributes:
         framing: framing of the line: frames of RTC-Lite, or packets of RTno (bridge mode).
         checksum: algorithm of the checksum (DECISION L5). Packets of RTno always use `sum8`.
-        context: the execution context.
+        context: type of the execution context, which decides when `on_execute` runs.
         rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another rate.
-        slow_answer_us: delay of each answer by the fault `slow_answer`.
+        slow_answer_us: delay of each answer while the fault `slow_answer` is present.
 
     Raises:
         ValueError: a rate or a delay is out of range.
@@ -57,12 +57,14 @@ _BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
 
 @dataclass(slots=True)
 class LiteServer:
-    """Answers the requests of the proxy, without a clock.
+    """Executes the requests that a proxy sends to an RTC-Lite node, and returns the answers.
+
+    The server has no clock. The node calls `execute` when the timer's period has ended.
 
     Attributes:
         life: life cycle of the component, with its state.
-        context: the execution context.
-        timer: the timer whose rate can be set.
+        context: type of the execution context.
+        timer: the timer whose rate the proxy can set.
     """
 
     life: LiteLifeCycle

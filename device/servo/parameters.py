@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MotorParameters(Immutable):
-    """A permanent-magnet motor, brushed or brushless, modelled as one winding.
+    """Parameters of a permanent-magnet motor, brushed or brushless, modelled as one winding.
 
     Attributes:
         resistance_ohm: terminal resistance at 25 degC.
         inductance_h: terminal inductance.
-        torque_constant_nm_a: torque per current, and back-EMF per speed (V s/rad).
+        torque_constant_nm_a: torque per current. It also is the back-EMF per speed (V s/rad).
         inertia_kg_m2: inertia of the rotor.
         coulomb_nm: dry friction of the rotor, which is more than 0 so that the rotor comes to rest.
-        viscous_nm_s: friction that grows with the speed, per rad/s.
+        viscous_nm_s: friction torque that grows with the speed, per rad/s.
         winding_housing_k_w: thermal resistance from the winding to the housing.
         housing_ambient_k_w: thermal resistance from the housing to the air.
         winding_s: thermal time constant of the winding while the housing keeps its temperature.
@@ -52,13 +52,13 @@ class MotorParameters(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class PowerStage(Immutable):
-    """A four-quadrant stage of ideal switches.
+    """Parameters of a servo's power stage, a four-quadrant stage of ideal switches.
 
     Attributes:
         continuous_a: current that the stage carries permanently.
-        peak_a: current that the stage never exceeds.
+        peak_a: largest current of the stage.
         peak_s: time for which the stage carries the peak current.
-        duty_max: largest part of the supply that reaches the winding.
+        duty_max: largest part of the supply voltage that reaches the winding, 0..1.
         supply_v: supply voltage at the start.
         supply_min_v: supply voltage below which the switches stay open.
     """
@@ -80,11 +80,11 @@ class PowerStage(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class GearParameters(Immutable):
-    """A gear without play, with the inertia and friction of its output shaft.
+    """Parameters of a gear without play, with the inertia and friction of its output shaft.
 
     Attributes:
         ratio: number of motor turns per turn of the output shaft.
-        efficiency: share of the power of an external torque that the gear transmits.
+        efficiency: share of the power of an external torque that the gear transmits, up to 1.
         inertia_kg_m2: inertia at the output shaft, without the motor's own inertia.
         coulomb_nm: dry friction at the output shaft.
     """
@@ -102,12 +102,12 @@ class GearParameters(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Encoders(Immutable):
-    """The incremental encoder of the motor, and an absolute encoder of the output shaft.
+    """Resolution of a servo's motor encoder, and of the absolute encoder of its output shaft.
 
     Attributes:
         counts_per_turn: number of quadrature counts per turn of the motor.
-        gear_counts_per_turn: number of counts of the absolute encoder per turn, or 0 if the servo
-            has none.
+        gear_counts_per_turn: number of counts of the absolute encoder per turn of the output shaft,
+            or 0 if the servo has no absolute encoder.
     """
 
     counts_per_turn: int
@@ -119,7 +119,9 @@ class Encoders(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class LoopGains(Immutable):
-    """Tuning of the loops, for the inertia without `load_kg_m2`.
+    """Tuning of a servo's velocity and position loops.
+
+    The values apply to the inertia of the servo without the additional inertia `load_kg_m2`.
 
     Attributes:
         velocity_rad_s: natural frequency of the velocity loop.
@@ -266,7 +268,9 @@ def peak_torque_nm(servo: ServoParameters) -> float:
 
 
 def free_speed_rad_s(servo: ServoParameters) -> float:
-    """Return the speed of the output shaft at which the back-EMF equals the supply voltage.
+    """Return the speed at which a servo without load turns at its largest voltage, in rad/s.
+
+    At this speed of the output shaft the back-EMF equals the voltage.
 
     >>> from tickrig.device.servo.parameters import EPOS_WHEEL
     >>> round(free_speed_rad_s(EPOS_WHEEL), 1)
@@ -277,7 +281,7 @@ def free_speed_rad_s(servo: ServoParameters) -> float:
 
 
 def of_size(servo: ServoParameters, size: float) -> ServoParameters:
-    """Return the parameters of several equal servos on one shaft.
+    """Return the parameters of a servo that is as strong as several equal servos on one shaft.
 
     Currents, torques, inertias and friction are multiplied by the number of servos. Electrical and
     thermal resistances are divided by it. Speeds, voltages, temperatures and all time constants

@@ -228,10 +228,14 @@ class Plant(Part):
         self._left = exp(-resistance_ohm * STEP_S / self._motor.inductance_h)
 
     def bear(self, load_nm: float, efficiency: float) -> None:
-        """Set an external torque; the gear's loss acts as friction.
+        """Set the external torque on the output shaft. The loss in the gear acts as friction.
 
         If the torque opposes the motion, the motor must supply 1 / efficiency of it. If the torque
         acts with the motion, the motor gets only the transmitted share of it.
+
+        Args:
+            load_nm: external torque.
+            efficiency: efficiency of the gear.
         """
         # A gear that loses a part of the power acts like friction that depends on the load: the
         # motor supplies 1/efficiency against the load and gets efficiency of it back.
@@ -250,7 +254,10 @@ class Plant(Part):
         self.blocked = blocked
 
     def open(self) -> None:
-        """Run one step with the winding open, in which a remaining current decays in the diodes."""
+        """Advance motor and load by one control step with the power stage off.
+
+        The winding is open. A remaining current ends at once, and its energy becomes heat.
+        """
         # The energy of the inductance, L i^2 / 2, becomes heat at once; no step models its decay.
         self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
         self.current_a = 0.0
@@ -262,7 +269,16 @@ class Plant(Part):
         self._turn(speed, a1 * w + a3 * (m + friction), friction)
 
     def drive(self, current_a: float, limit_v: float) -> int:
-        """Run one step towards a current; return how the voltage limits it: -1, 0 or 1."""
+        """Advance motor and load by one control step in which the current goes to a demanded value.
+
+        Args:
+            current_a: demanded current.
+            limit_v: largest voltage of the power stage.
+
+        Returns:
+            0 if the voltage is sufficient, or the sign of the limit that the voltage has reached:
+                -1 or 1.
+        """
         # Standstill is handled separately: winding alone, without back-EMF. The general step uses
         # one friction for the whole step; with it the shaft would end at speed 0, but its angle
         # would creep during the step.

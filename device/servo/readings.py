@@ -35,10 +35,10 @@ _Temperatures = tuple[float, float]
 
 
 class ThermalModel(Part):
-    """Winding and housing, heated by the current in the winding.
+    """Thermal model of a motor: winding and housing, heated by the current in the winding.
 
     The heat is R I^2, and R grows with the temperature. The system stays linear, so its state at
-    any later time has a closed form.
+    any later time is computed by a formula, without steps.
 
     Not modelled: heat of friction and iron, the gear, the power stage, moving air.
     """
@@ -59,10 +59,10 @@ class ThermalModel(Part):
     def after(
         self, start: _Temperatures, seconds: float, square_a2: float, ambient_c: float
     ) -> _Temperatures:
-        """Return the temperatures after some time.
+        """Return the temperatures of winding and housing after some time.
 
         Args:
-            start: present temperatures.
+            start: present temperatures of winding and housing, in degC.
             seconds: time from now, 0 or more.
             square_a2: mean square of the current in this time, in A^2.
             ambient_c: temperature of the air.
@@ -107,7 +107,7 @@ def _span(rate: float, seconds: float) -> float:
 
 
 class I2t(Part):
-    """The I2t protection of a power stage.
+    """I2t protection of a power stage, which limits the time of more than the rated current.
 
     A budget of (peak^2 - continuous^2) * time fills with the square of the current above the
     continuous current, and drains when the current is below it. When the budget is full, only the
@@ -175,13 +175,13 @@ _RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it i
 
 
 class Heat(Part):
-    """Temperatures and I2t budget of a servo, from the squared current.
+    """Temperatures and I2t budget of a servo, computed from its squared current.
 
     Attributes:
         since_us: time of the latest computation.
-        temperatures: temperatures at the time of the latest computation.
-        winding_dc: temperature of the winding at the time of the latest computation, in 0.1 degC.
-        ambient_c: temperature of the air since the latest computation.
+        temperatures: temperatures of winding and housing at that time, in degC.
+        winding_dc: temperature of the winding at that time, in 0.1 degC.
+        ambient_c: temperature of the air since that time.
         i2t: overload protection of the power stage.
     """
 
@@ -265,10 +265,12 @@ class Heat(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ServoSettings(Copyable):
-    """Settings of a servo, which call `changed` when they are set to another value.
+    """Settings of a servo that may change while it runs, such as supply, load and faults.
+
+    Setting another value calls `changed`.
 
     Attributes:
-        supply_mv: supply of the power stage in millivolts, which `supply_v` sets.
+        supply_mv: supply voltage of the power stage in millivolts, which `supply_v` sets.
     """
 
     __slots__ = (
@@ -378,9 +380,10 @@ class ServoSettings(Copyable):
 
 
 class Readings(ServoSettings):
-    """Readings of a servo; the docstring of `Servo` describes the attributes.
+    """Readings of a servo: position, speed, current, temperatures. It is a base class of `Servo`.
 
-    Integers are measurements of the drive; floats are values for observers.
+    Integers are measurements as the drive sees them. Floats are exact values for observers. The
+    docstring of `Servo` describes the attributes.
     """
 
     __slots__ = (
@@ -413,7 +416,10 @@ class Readings(ServoSettings):
 
     @property
     def gear_counts(self) -> int:
-        """Angle from the absolute encoder of the output shaft, with all turns; 0 if it has none."""
+        """Angle of the output shaft from its absolute encoder, in counts with all turns.
+
+        It is 0 if the servo has no such encoder.
+        """
         return floor(self.shaft_deg / 360.0 * self.parameters.encoders.gear_counts_per_turn)
 
     @property

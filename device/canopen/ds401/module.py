@@ -142,7 +142,7 @@ class _FaultDetector(Part):
         self._present.clear()
 
     def look(self, inputs: QuantityBank) -> bool:
-        """Check the physical inputs for faults, and report by EMCY those that have begun or ended.
+        """Check the physical inputs for faults, and report new and ended faults by EMCY.
 
         Returns:
             True if a new fault stops the outputs.

@@ -67,7 +67,7 @@ class Rpdo(Part):
     def reconfigures(self) -> bool:
         """Whether the RPDO can change communication objects, and so the slave's CAN-IDs.
 
-        That is so for an MPDO, and for an RPDO with a mapped communication object.
+        This applies to an MPDO, and to an RPDO with a mapped communication object.
         """
         entries = (slot.entry for slot in self.mapping.slots())
         return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(

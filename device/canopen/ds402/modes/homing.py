@@ -24,14 +24,16 @@ class Switch(IntFlag):
 class HomingMethod(NamedTuple):
     """A homing method of CiA 402: how the drive searches for home, and where home is.
 
+    Directions are -1, +1, or 0 for a method without motion.
+
     Attributes:
         switch: switch whose edge is searched, or None if the method uses no switch.
-        first: direction of the search while the switch is not active: -1 or +1.
+        first: direction of the search while the switch is not active.
         approach: direction in which the axis finally crosses the edge and then searches for the
-            index pulse: -1 or +1.
+            index pulse.
         active: whether the switch is active after the edge, in the direction of `approach`.
         turns: whether the search reverses at the limit switch of its first direction.
-        by_index: whether home is the first index pulse after the edge. Otherwise home is the edge
+        by_index: whether home is the next index pulse after the edge. Otherwise home is the edge
             itself.
     """
 
