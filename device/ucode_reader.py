@@ -20,11 +20,11 @@ from tickrig.wire.ucode import MAX_LEVEL, ROUNDS, LineType, UcodeLine, parse_uco
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReaderParameters(Immutable):
-    """Parameters of a reader.
+    """Parameters of an infra-red reader for ucodes: its range and its angle of reception.
 
     Attributes:
-        range_m: range at which the reader receives a marker, 0.1..99.
-        cone_deg: full angle of reception around the heading of the reader, 1..360.
+        range_m: range at which the reader receives a marker, 0.1..99 m.
+        cone_deg: full angle of reception around the heading of the reader, 1..360 degrees.
 
     Raises:
         ValueError: a value is out of range.
@@ -46,12 +46,12 @@ class ReaderParameters(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Marker(Immutable):
-    """A marker that sends its ucode in all directions, on a flat floor.
+    """An infra-red marker on a flat floor, which sends its ucode in all directions.
 
     Attributes:
         ucode: ucode of 128 bits, as 32 hex digits in capitals.
-        x_m: position in x.
-        y_m: position in y, which is to the left of x.
+        x_m: position in x, in metres.
+        y_m: position in y, which is to the left of x, in metres.
 
     Raises:
         ValueError: the ucode or the position is invalid.
@@ -71,7 +71,7 @@ class Marker(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Reception(Immutable):
-    """A received marker.
+    """A ucode that a reader has received, with its signal level.
 
     Attributes:
         ucode: the received ucode.
@@ -85,14 +85,14 @@ class Reception(Immutable):
 def receive(
     markers: Sequence[Marker], pose: Pose, parameters: ReaderParameters, share: float = 1.0
 ) -> tuple[Reception, ...]:
-    """Return the markers that a reader receives, with the nearest marker first.
+    """Return what a reader receives from the markers around it, with the nearest marker first.
 
     Not emulated: walls, which infra-red light does not pass; markers that disturb one another;
     reflections.
 
     Args:
         markers: the sending markers.
-        pose: pose of the reader.
+        pose: position and heading of the reader.
         parameters: range and cone of the reader.
         share: share of the range that remains, for example behind a dirty window, 0..1.
     """
@@ -216,7 +216,7 @@ class UcodeReader(Copyable):
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Return the present value of an output.
+        """Return the present value of a physical output.
 
         Args:
             name: name of an output in `outputs`.
@@ -230,7 +230,7 @@ class UcodeReader(Copyable):
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Receive the bytes that have arrived, and advance to now.
+        """Run one tick of the reader: receive bytes from the host, answer, and report ucodes.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

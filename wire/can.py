@@ -67,7 +67,9 @@ _NOTATION: Final = re.compile(
 
 
 class CanFrame(NamedTuple):
-    """A data or remote frame. For speed the frame is not validated; see `checked`.
+    """A classic CAN frame, either a data frame or a remote frame.
+
+    For speed the values are not validated when a frame is made; see `checked`.
 
     Attributes:
         can_id: identifier, 0x000..0x7FF, or 0x0000_0000..0x1FFF_FFFF if extended.
@@ -90,7 +92,7 @@ class CanFrame(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> CanFrame:
-        """Read candump's compact notation.
+        """Parse a frame in candump's compact notation, such as `123#AABB`.
 
         Args:
             text: frame as `ID#DATA`, or as `ID#R` with an optional length. An ID with 8 digits is
@@ -117,7 +119,7 @@ class CanFrame(NamedTuple):
         return frame.checked()
 
     def checked(self) -> CanFrame:
-        """Check the frame.
+        """Check that identifier and data are valid, and return the frame itself.
 
         Returns:
             The frame itself.
@@ -331,7 +333,9 @@ _FD_NOTATION: Final = re.compile(
 
 
 class FdFrame(NamedTuple):
-    """A CAN FD frame, which is always a data frame. The frame is not validated; see `checked`.
+    """A CAN FD frame, which is always a data frame.
+
+    The values are not validated when a frame is made; see `checked`.
 
     Attributes:
         can_id: identifier, 0x000..0x7FF, or 0x0000_0000..0x1FFF_FFFF if extended.
@@ -367,7 +371,7 @@ class FdFrame(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> FdFrame:
-        """Read candump's compact notation.
+        """Parse a frame in candump's compact notation for CAN FD, such as `123##1AABB`.
 
         Args:
             text: frame as `ID##FDATA`. F is one hex digit: 1 means BRS, 2 means ESI, and other
@@ -393,7 +397,7 @@ class FdFrame(NamedTuple):
         return frame.checked()
 
     def checked(self) -> FdFrame:
-        """Check the frame.
+        """Check that identifier and data are valid, and return the frame with a valid length.
 
         Returns:
             The frame. Data of an invalid length are padded with zeros to the next valid length, as
@@ -419,7 +423,7 @@ class FdFrame(NamedTuple):
 
 
 class FdBits(NamedTuple):
-    """The length of a frame on the bus.
+    """The length of a CAN FD frame on the bus in bits, separately for its two bit rates.
 
     The rate is assumed to switch after the bit BRS and before the CRC delimiter. In reality the
     rate switches at the sample points of these two bits, which differ from bus to bus.
@@ -444,10 +448,10 @@ _KEPT: Final = 1_024
 
 
 def fd_bits(frame: FdFrame) -> FdBits:
-    """Return the numbers of bits of a frame, with stuff bits and interframe space (ISO 11898-1).
+    """Return the length of a CAN FD frame in bits, with all stuff bits (ISO 11898-1).
 
     The bits from start of frame to the end of the data are stuffed as in classic CAN. The CRC field
-    has stuff bits at fixed places. The first fixed stuff bit replaces a stuff bit that the last
+    has stuff bits at fixed positions. The first fixed stuff bit replaces a stuff bit that the last
     data bits would need.
     """
     data, length = frame.data, frame.dlc
@@ -490,7 +494,9 @@ def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
 
 
 def parse_sent(text: str) -> CanFrame | FdFrame:
-    """Read a frame in candump's compact notation, in which `##` marks CAN FD.
+    """Parse a CAN or CAN FD frame in candump's compact notation, such as `123#AABB`.
+
+    `##` in place of `#` marks a CAN FD frame.
 
     Raises:
         FramingError: the text is not a frame in this notation.
@@ -516,7 +522,7 @@ class ErrorState(IntEnum):
 
 
 class ErrorFrame(NamedTuple):
-    """An error frame of SocketCAN (linux/can/error.h).
+    """An error frame of SocketCAN (linux/can/error.h), which reports an error on the bus.
 
     Attributes:
         error_class: class of the error, as a set of CAN_ERR_ bits.
@@ -657,7 +663,7 @@ class CandumpError(ValueError):
 
 
 class LogLine(NamedTuple):
-    """A frame or error frame of a log.
+    """A line of a candump log: a frame or error frame with its time and its bus.
 
     Attributes:
         at_us: time of the end of the frame, in us.

@@ -14,10 +14,12 @@ It is the largest int that compiled code stores without an object, which makes d
 def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
     """Return the time of the first tick that is after `now_us` and not before `due_us`.
 
+    Ticks are at all multiples of `tick_us`.
+
     Args:
-        now_us: time that the tick follows.
+        now_us: present time.
         due_us: the earliest time of the tick, which may be `NEVER`.
-        tick_us: period of the ticks, which are at its multiples.
+        tick_us: period of the ticks.
 
     >>> next_tick_us(1_000, 0, 1_000), next_tick_us(1_000, 2_500, 1_000)
     (2000, 3000)

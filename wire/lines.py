@@ -7,7 +7,7 @@ from tickrig._compiled import mypyc_attr
 
 @mypyc_attr(serializable=True)
 class LineSplitter:
-    r"""Collects bytes into whole lines, however they are split into chunks.
+    r"""Splits a stream of received bytes into lines, however the bytes are divided into chunks.
 
     Args:
         max_bytes: largest number of bytes of a line. A longer line is returned in pieces, so that
@@ -23,7 +23,7 @@ class LineSplitter:
         self._max_bytes = max_bytes
 
     def push(self, data: bytes) -> list[bytes]:
-        """Add received bytes and return the completed lines.
+        """Add received bytes, and return the lines that they complete.
 
         Args:
             data: the received bytes.

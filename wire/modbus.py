@@ -64,7 +64,7 @@ def encode_frame(address: int, message: bytes) -> bytes:
 
 
 def parse_frame(frame: bytes) -> tuple[int, bytes]:
-    """Check the CRC of a frame, and return the address and the message.
+    """Check the CRC of a Modbus RTU frame, and return its address and its message.
 
     Raises:
         FramingError: the length is invalid.
@@ -112,12 +112,14 @@ class Refusal(WireError):  # noqa: N818 - what the slave does
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request, in which writes happen before reads.
+    """A Modbus request to read registers, to write registers, or both.
+
+    If it does both, the registers are written before the others are read.
 
     Attributes:
         function: function code.
-        read: first register, and number of registers to read.
-        write: first register, and values to write.
+        read: first register and number of registers to read, or None.
+        write: first register and values to write, or None.
     """
 
     function: int
@@ -141,7 +143,7 @@ def encode_request(request: Request) -> bytes:
 
 
 def parse_request(message: bytes) -> Request:
-    """Read a request.
+    """Read the message of a Modbus request.
 
     Raises:
         Refusal: the function is unknown, or a number is out of range.
@@ -161,7 +163,12 @@ def parse_request(message: bytes) -> Request:
 
 
 def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
-    """Return the bytes of the response to a successful request; `values` are the read values."""
+    """Return the message of the response to a successful Modbus request.
+
+    Args:
+        request: the request.
+        values: values of the registers that were read.
+    """
     out = bytes([request.function])
     if request.read is not None:
         return out + bytes([2 * len(values)]) + _pack_registers(values)
@@ -292,7 +299,10 @@ class Status(IntFlag):
 
 
 class Fault(IntFlag):
-    """Reason for switching a wheel off (0201h, 0202h), our choice because the proposal has none."""
+    """Reasons for which the driver has switched a wheel off, as bits of registers 0201h and 0202h.
+
+    They are our choice because the proposal defines none.
+    """
 
     OVER_CURRENT = 0x01
     ENCODER = 0x04
@@ -301,12 +311,12 @@ class Fault(IntFlag):
 
 
 class Report(NamedTuple):
-    """Registers that a master reads in each period: 12 registers from `Address.STATUS` on.
+    """The 12 registers from `Address.STATUS` on, which a master reads in each period.
 
     Attributes:
         status: status of the driver.
-        fault_left: fault of the left wheel.
-        fault_right: fault of the right wheel.
+        fault_left: reason for which the left wheel is off.
+        fault_right: reason for which the right wheel is off.
         sample: number of milliseconds since power-up, modulo 65536.
         left: position of the left wheel, in counts.
         right: position of the right wheel, in counts.

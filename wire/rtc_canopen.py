@@ -51,7 +51,9 @@ MAX_TEXT: Final = 255
 
 @dataclass(frozen=True, slots=True)
 class CanopenPortType(Generic[T]):
-    """A data type of a port; each element of a value is an object in the dictionary.
+    """The data type of a port of a DeviceRTC.
+
+    Each element of a value is a separate sub-index in the object dictionary.
 
     Attributes:
         name: name of the RTC type in Table 4.
@@ -91,7 +93,10 @@ class CanopenPortType(Generic[T]):
 
     @property
     def bits(self) -> int:
-        """Number of bits of a value in a PDO, or 0 for a text, which does not fit into a PDO."""
+        """Number of bits that a value has in a PDO.
+
+        It is 0 for a text, because a text does not fit into a PDO.
+        """
         return self.element_bits * self.length
 
     @property
@@ -160,7 +165,12 @@ _INTEGERS: Final = {8: DataType.INTEGER8, 16: DataType.INTEGER16, 32: DataType.I
 
 
 def integer(word_bits: int) -> CanopenPortType[int]:
-    """Return the type Integer for a device with a given word size (Table 4, note 1).
+    """Return the port type Integer of a device, whose size is the word size of its processor.
+
+    See Table 4, note 1.
+
+    Args:
+        word_bits: word size in bits.
 
     Raises:
         ValueError: the word size is not 8, 16 or 32.
@@ -211,7 +221,7 @@ class PortTransport(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CanopenPortProfile:
-    """Declaration of a port.
+    """Declaration of a port of a DeviceRTC: name, direction, type and transport.
 
     Attributes:
         name: name of the port: a letter, then up to 31 letters, digits and underscores.
@@ -241,7 +251,7 @@ class CanopenPortProfile:
 
 @dataclass(frozen=True, slots=True)
 class PlacedPort:
-    """A port with its objects and its PDO.
+    """A port of a DeviceRTC with the object and the PDO that are assigned to it.
 
     Attributes:
         profile: declaration of the port.
@@ -260,9 +270,10 @@ class PlacedPort:
 
     @property
     def cob_id(self) -> int | None:
-        """CAN-ID of RPDO n for an in-port, or of TPDO n for an out-port.
+        """CAN-ID of the port's PDO, or None if the PDO is off.
 
-        If `relative` is true, the CAN-ID is without the node-ID. None means that the PDO is off.
+        An in-port has an RPDO, an out-port has a TPDO. If `relative` is true, the node-ID must be
+        added.
         """
         if not self.relative:
             return self.profile.cob_id
@@ -271,13 +282,16 @@ class PlacedPort:
 
     @property
     def subs(self) -> tuple[int, ...]:
-        """Sub-indices of the elements: 0 for a variable, or 1 and up for an array."""
+        """Sub-indices of the object that contain the elements of the port's value.
+
+        They are 0 for a single element, or 1 and up for an array.
+        """
         length = self.profile.port_type.length
         return (0,) if length == 1 else tuple(range(1, length + 1))
 
     @property
     def mapping(self) -> tuple[int, ...]:
-        """The mapping parameter of the PDO.
+        """Entries of the mapping parameter of the port's PDO.
 
         Each Boolean has one bit (Table 4). Dummy bits pad the last byte of an RPDO. A TPDO cannot
         have dummy bits (CiA 301), so its last byte ends with unmapped zeros.
@@ -290,7 +304,7 @@ class PlacedPort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RtcProfile:
-    """The profile of a component.
+    """The profile of a component on a CANopen device: its name, version, rate and ports.
 
     Attributes:
         type_name: type of the component, spelled like the name of a port. It is the value of 1008h.
@@ -341,7 +355,11 @@ class RtcProfile:
         return int(major) << 16 | int(minor)
 
     def placed(self, direction: PortDirection | None = None) -> tuple[PlacedPort, ...]:
-        """Return the ports with their objects: all ports, or ports with a PDO in one direction."""
+        """Return the ports with the objects and PDOs that are assigned to them.
+
+        Args:
+            direction: direction of the ports that have a PDO, or None to return all ports.
+        """
         return tuple(
             port
             for port in self._place()
@@ -416,7 +434,7 @@ _HEARTBEAT_MS: Final = 100
 
 
 def object_table(profile: RtcProfile) -> ObjectTable:
-    """Return the objects: the objects of CiA 301, then an object for each port from 2100h on."""
+    """Return the objects of a DeviceRTC: those of CiA 301, and from 2100h on one for each port."""
     table = ObjectTable()
     communication = CommunicationProfile(
         device_type=_NO_PROFILE,

@@ -429,7 +429,11 @@ class Readings(ServoSettings):
 
     @property
     def spare_mv(self) -> int:
-        """Voltage of the stage minus the back-EMF; if it is below 0, a load drives the motor."""
+        """Voltage left for driving current: largest voltage of the power stage minus the back-EMF, in
+        mV.
+
+        It is below 0 if an external load turns the motor faster than the supply can.
+        """
         stage, motor = self.parameters.stage, self.parameters.motor
         speed_rad_s = 0.0 if self.encoder_unplugged else abs(self._plant.speed_rad_s)
         back_emf_v = motor.torque_constant_nm_a * speed_rad_s

@@ -115,7 +115,7 @@ class _Loops(Part):
         return self.turn(velocity + self._position * error, acceleration, speed)
 
     def turn(self, velocity: float, acceleration: float, speed: float) -> float:
-        """Return the current for a demanded velocity, in A.
+        """Run the velocity loop for one step, and return the current that it demands, in A.
 
         Args:
             velocity: demanded velocity, in counts/s.
@@ -138,7 +138,10 @@ class _Loops(Part):
 
 
 class Line(Part):
-    """Position demands on a straight line to a goal, and standstill there.
+    """The demanded positions of the next steps, on a straight line to a goal.
+
+    After the goal the demanded position stays there. `Servo.run_ahead` uses it to compute steps
+    ahead.
 
     Attributes:
         position: present demanded position, in counts.
@@ -146,7 +149,8 @@ class Line(Part):
         goal: position at the end of the line, in counts.
         left: number of steps up to the goal.
         added: velocity that is demanded in addition to the velocity of the line, in counts/s.
-        most: largest velocity of the line, in counts/s. A run ends before a step that needs more.
+        most: largest velocity of the line, in counts/s. `run_ahead` ends before a step that needs
+            more.
     """
 
     __slots__ = ("added", "goal", "left", "most", "position", "velocity")
@@ -180,7 +184,7 @@ Four = tuple[float, float, float, float]
 
 
 class RunAhead(Part):
-    """State of a servo after some steps.
+    """Result of `Servo.run_ahead`: the state of a servo after some steps, to be applied later.
 
     Attributes:
         steps: number of steps.
@@ -276,7 +280,9 @@ class Servo(Readings):
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Drive to a position; velocity and acceleration are fed forward.
+        """Demand a position, as for the next step of a position controller.
+
+        Velocity and acceleration are fed forward to the velocity loop.
 
         Args:
             position: demanded position now, in counts. Fractions are accepted.
@@ -303,16 +309,16 @@ class Servo(Readings):
     def run_ahead(  # noqa: PLR0912, PLR0915 - one loop over locals
         self, line: Line, most_steps: int, bounds: Bounds
     ) -> RunAhead:
-        """Compute control steps without applying them, with exactly the results of single steps.
+        """Compute the next control steps ahead, without applying them.
 
-        The run ends before the first step in which friction stops or holds the shaft, the demand is
-        cut, the motor gets another resistance, or the bounds are left. Single steps continue from
-        the end of the run.
+        The results are exactly those of single steps. The run ends before the first step in which
+        friction stops or holds the shaft, the demand is limited, the resistance of the motor
+        changes, or the bounds are left. Single steps can continue from the end of the run.
 
         Args:
-            line: demands without acceleration, beginning with the present demand.
+            line: demanded positions without acceleration, beginning with the present demand.
             most_steps: largest number of steps.
-            bounds: bounds of the run.
+            bounds: bounds within which the run may continue.
         """
         # one loop over locals takes half the time of calls
         plant, loops, heat = self._plant, self._loops, self._heat

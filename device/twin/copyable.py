@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Immutable:
-    """A description that never changes after creation, such as that of a dictionary.
+    """Base class of objects that never change after creation, such as descriptions.
 
-    Copies within the process share the description. A pickle contains it by value.
+    Copies of a machine within the process share such an object. A pickle contains its value.
 
     Attributes:
         shared_by_twins: flag that is always true. Classes of wire/ have this attribute instead of
@@ -51,13 +51,14 @@ class Part:
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Copyable:
-    """A machine that `copy.deepcopy`, `pickle` and `twin` can copy.
+    """Base class of machines that `copy.deepcopy`, `pickle` and `twin` can copy while they run.
 
-    With the same input a twin behaves exactly as the original, to the byte. Other input to the twin
-    does not affect the original.
+    A twin is such a copy. With the same input it behaves exactly as the original, to the byte.
+    Other input to the twin does not affect the original.
 
     Attributes:
-        _new_in_twins: attributes with fixed values in a twin, such as callbacks of outside code.
+        _new_in_twins: attributes that have the given values in a twin instead of copies, such as
+            callbacks of outside code.
     """
 
     __slots__ = ()
@@ -78,10 +79,12 @@ class Copyable:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NonCopyable:
-    """An object bound to its process; `copy.copy`, `deepcopy`, `pickle` and `twin` raise.
+    """Base class of objects that cannot be copied, because they are bound to their process.
+
+    `copy.copy`, `deepcopy`, `pickle` and `twin` raise TypeError for them.
 
     Attributes:
-        why_not_copied: reason as readable text.
+        why_not_copied: reason as readable text, for the message of the error.
     """
 
     __slots__ = ()

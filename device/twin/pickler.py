@@ -45,11 +45,13 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
-    """Return the initial state of a twin; `__getstate__` uses it, also in compiled classes.
+    """Return the attributes from which a copy (twin) of a machine is made.
+
+    `__getstate__` calls this function. It works for compiled classes, too.
 
     Args:
         machine: the machine to copy.
-        begun: attributes with fixed values in a twin.
+        begun: attributes that have the given values in the copy.
 
     Returns:
         The attributes of the machine by name. If some attributes are not in its `__dict__`, the
@@ -81,7 +83,7 @@ def restore(machine: object, state: Any) -> None:
 def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
     """Return an independent copy of a device, a wire or a rig in its present state.
 
-    `Immutable` parts are shared.
+    `Immutable` parts are not copied but shared.
 
     Args:
         machine: machine to copy, with everything that it refers to.

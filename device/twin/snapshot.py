@@ -113,7 +113,9 @@ class MachineSnapshot:
         self._put_back: tuple[_PutBack, ...] = tuple(_Walk().through(machines))
 
     def restore(self) -> None:
-        """Restore the state; the method may be called repeatedly.
+        """Restore the machine to its state at the time of the snapshot.
+
+        The method may be called several times.
 
         Raises:
             TypeError: a generator has advanced since the snapshot, which cannot be undone.

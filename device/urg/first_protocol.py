@@ -53,12 +53,12 @@ _BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 
 @dataclass(slots=True)
 class Settings:
-    """Bit rate and sensitivity. The sensitivity is only reported.
+    """Bit rate and sensitivity of a URG sensor, as the host has set them.
 
     Attributes:
         rate: bit rate of RS-232C in bit/s. On USB the sensor only reports this rate.
-        sensitive: whether the sensor measures in the sensitive mode, which has no effect on the
-            emulation.
+        sensitive: whether the sensor measures in the sensitive mode. The sensor only reports it,
+            because it has no effect on the emulation.
         first_rate: bit rate after power-up.
     """
 
@@ -128,17 +128,22 @@ class Sensor(Protocol):
         """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Return the answer with the latest scan, b"" if it follows later, None if refused."""
+        """Return the answer to a G command with the latest scan.
+
+        Returns:
+            The answer, or b"" if it follows after the next scan, or None if the sensor refuses the
+            command.
+        """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Capture(Immutable):
-    """A G command that waits for a scan.
+    """A G command of SCIP 1.1, which requests one scan and waits for it.
 
     Attributes:
         line: the command as received.
-        first: first step to send.
+        first: first step (direction of a beam) to send.
         last: last step to send.
         cluster: number of steps for each number in the answer.
     """

@@ -147,12 +147,13 @@ _WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
 
 @dataclass(slots=True)
 class Stream:
-    """A command that requests scans.
+    """A command of SCIP 2.0 that requests one or more scans.
 
     Attributes:
         command: command as received, which is valid.
-        begins_us: time from which scans count for the command. Scans that end before do not count.
-        left: number of remaining scans, or 0 if endless.
+        begins_us: time from which scans count for the command. A scan that ends earlier is not
+            sent.
+        left: number of remaining scans, or 0 for scans without end.
         skipped: number of scans still to be skipped.
     """
 
@@ -215,7 +216,7 @@ _Answer = tuple[str, tuple[bytes, ...]]
 
 
 class ScipServer(Part):
-    """Executes commands and sends scans (SCIP 2.0, sensor commands).
+    """Executes the commands of a host in a URG sensor, and sends scans (SCIP 2.0, sensor commands).
 
     Until a host switches to SCIP 2.0, the server executes the commands of SCIP 1.1
     (`first_protocol`).
@@ -229,7 +230,7 @@ class ScipServer(Part):
         laser: whether the laser is on.
         settings: bit rate and sensitivity.
         rotation: rotation of the mirror.
-        trouble: status of the fault, or empty without a fault.
+        trouble: status code of the present fault, or empty without a fault.
         served: number of commands that were answered.
         scans: number of measured scans.
         due_us: end of the present scan.
@@ -330,7 +331,12 @@ class ScipServer(Part):
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Return the answer with the latest scan, b"" if it follows later, None if refused."""
+        """Return the answer to a command that requests a single scan.
+
+        Returns:
+            The answer with the latest scan, or b"" if it follows after the next scan, or None if
+            the laser is off or another command waits.
+        """
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:

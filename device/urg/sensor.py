@@ -133,7 +133,7 @@ class Urg(Copyable):
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Return an output as the latest tick left it.
+        """Return the value that a physical output had after the latest tick.
 
         Args:
             name: name of an output in `outputs`.
@@ -147,7 +147,7 @@ class Urg(Copyable):
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Receive the bytes that have arrived, and advance to now.
+        """Run one tick of the sensor: receive commands from the host, answer, and send scans.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

@@ -34,11 +34,12 @@ _PROTOCOLS: Final = ("1.1", "2.0")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrgParameters(Immutable):
-    """Parameters of a sensor.
+    """Parameters of an emulated URG laser scanner: its serial number, noise and interface.
 
     Attributes:
         serial: serial number of letters and digits.
-        noise: share of the accuracy (10 mm below 1 m, 1 % above), 0..1.
+        noise: noise of the distances as a share of the sensor's accuracy (10 mm below 1 m, 1 %
+            above), 0..1.
         seed: seed of the noise.
         scip: protocol after power-up: 1.1 as in the URG-04LX, whose laser is then on, or 2.0 as in
             sensors such as the URG-04LX-UG01, whose laser is then off.
@@ -93,7 +94,10 @@ class Wall(Immutable):
             raise ValueError(f"a wall has two places that are not the same, got {ends}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return the distance along each ray to the wall, or infinity if it misses the wall."""
+        """Return the distance from a position along each ray to this wall, in metres.
+
+        A ray that misses the wall has the distance infinity.
+        """
         wall_x, wall_y = self.x2_m - self.x1_m, self.y2_m - self.y1_m
         off_x, off_y = self.x1_m - x_m, self.y1_m - y_m
         area = off_x * wall_y - off_y * wall_x
@@ -122,7 +126,10 @@ class Post(Immutable):
             raise ValueError(f"a post has a place and a radius of 0 or more, got {numbers}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return the distance along each ray to the post, or infinity if it misses the post."""
+        """Return the distance from a position along each ray to this post, in metres.
+
+        A ray that misses the post has the distance infinity.
+        """
         # d = (off . ray) is the distance along the ray to the point nearest to the axis. (off x
         # ray) is the distance of this point from the axis.
         off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
@@ -169,7 +176,15 @@ class World(Immutable):
 
 
 def room(width_m: float, depth_m: float) -> World:
-    """Return four walls around the origin; raise ValueError if a size is not above 0."""
+    """Return a rectangular room as the surroundings of a sensor: four walls around the origin.
+
+    Args:
+        width_m: size in x, in metres.
+        depth_m: size in y, in metres.
+
+    Raises:
+        ValueError: a size is not above 0.
+    """
     if not (width_m > 0 and depth_m > 0):
         raise ValueError(f"a room has a width and a depth above 0, got {width_m}, {depth_m}")
     x_m, y_m = width_m / 2, depth_m / 2
@@ -204,12 +219,13 @@ _Span = tuple[int, int]
 
 
 class Beams(Part):
-    """Beams from a position, evenly spaced to the left.
+    """The laser beams of a scan from one position, evenly spaced to the left.
 
     Args:
-        x_m: position of the sensor in x.
-        y_m: position of the sensor in y.
-        rays: directions of the beams. Each direction is `tau / turn` after the previous one.
+        x_m: position of the sensor in x, in metres.
+        y_m: position of the sensor in y, in metres.
+        rays: directions of the beams as unit vectors. Each direction is `tau / turn` after the
+            previous one.
         first_rad: direction of the first beam, within 2e6.
         turn: number of beams in a full turn. `rays` has at most this number.
     """
@@ -220,7 +236,10 @@ class Beams(Part):
         self._ways_m = [inf] * len(self._rays)
 
     def cast_m(self, world: World) -> list[float]:
-        """Return the distance along each beam to the first object, or infinity if there is none."""
+        """Return the distance along each beam to the nearest object of the surroundings, in metres.
+
+        A beam that meets no object has the distance infinity.
+        """
         self._ways_m = [inf] * len(self._rays)
         for wall in world.walls:
             self._meet_wall(wall)
@@ -312,7 +331,7 @@ class _NoDistance(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class View(Immutable):
-    """A scan, whose rays are cast when their distances are requested.
+    """One scan of a sensor. The distances are computed when they are requested.
 
     Not emulated: motion of the sensor during a scan; angle of incidence, colour and gloss of
     objects; beams wider than a line.
@@ -322,7 +341,7 @@ class View(Immutable):
         time_ms: timer of the sensor when the scan began.
         pose: pose of the sensor when the scan ended.
         world: the surroundings when the scan ended.
-        kind: limits and steps of the sensor.
+        kind: range, steps and speed of the sensor model.
         parameters: noise and seed.
     """
 
@@ -334,10 +353,16 @@ class View(Immutable):
     parameters: UrgParameters
 
     def distances(self, first: int, last: int, cluster: int) -> tuple[int, ...]:
-        """Return a number for each whole `cluster` of steps: the least distance in mm.
+        """Return the distances of a range of steps in mm: the least distance of each cluster.
 
-        If no step of a cluster has a distance, the number is the code of its first step. Steps
-        after the last whole cluster have no number (DECISION U11).
+        A step is one direction of the scan, and a cluster is a group of consecutive steps. If no
+        step of a cluster has a distance, the number is the code of its first step. Steps after the
+        last whole cluster have no number (DECISION U11).
+
+        Args:
+            first: first step.
+            last: last step.
+            cluster: number of steps in a cluster.
         """
         kind, ways_m = self.kind, self._ways_m(range(first, last + 1))
         measurable = kind.first <= first and last <= kind.last

@@ -70,7 +70,10 @@ class DataType(IntEnum):
 
     @property
     def is_integer(self) -> bool:
-        """Whether a value is a whole number; BOOLEAN counts as a number of one bit."""
+        """Whether values of this data type are whole numbers.
+
+        BOOLEAN counts as a number of one bit.
+        """
         return self in _SIGNED or self in _UNSIGNED
 
     @property
@@ -80,13 +83,13 @@ class DataType(IntEnum):
         return lowest, lowest + (1 << self.bits) - 1
 
     def encode(self, value: Value) -> bytes:
-        """Return the bytes of a value, little endian (CiA 301, 7.1.4).
+        """Encode a value of this data type as bytes, little endian (CiA 301, 7.1.4).
 
         Args:
             value: number in the range of this type, or a text, or bytes.
 
         Raises:
-            FieldError: the value does not fit.
+            FieldError: the value does not fit the data type.
         """
         try:
             return _encode(self, value)
@@ -94,7 +97,7 @@ class DataType(IntEnum):
             raise FieldError(f"{value!r} is no {self.name}") from error
 
     def decode(self, data: bytes) -> Value:
-        """Return the value of bytes.
+        """Decode bytes into a value of this data type.
 
         Args:
             data: bytes, as in an SDO or a PDO.
@@ -195,7 +198,7 @@ _MS_MASK: Final = 0x0FFF_FFFF
 
 
 class TimeOfDay(NamedTuple):
-    """Absolute time.
+    """A time of day with its date, as in a TIME message of CANopen.
 
     Attributes:
         ms: number of milliseconds after midnight, 0 to 86 399 999.
@@ -207,7 +210,12 @@ class TimeOfDay(NamedTuple):
 
     @classmethod
     def parse(cls, data: bytes) -> TimeOfDay:
-        """Read a TIME stamp; FramingError unless it has 6 bytes, FieldError for an invalid time."""
+        """Read a time of day from the bytes of a TIME message.
+
+        Raises:
+            FramingError: the data do not have 6 bytes.
+            FieldError: the time is invalid.
+        """
         if len(data) != _LAYOUT.size:
             raise FramingError(f"a TIME stamp of {len(data)} bytes, it has {_LAYOUT.size}")
         ms, days = _LAYOUT.unpack(data)

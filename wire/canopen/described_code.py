@@ -7,7 +7,9 @@ from typing import Self
 
 
 class DescribedCode(IntEnum):
-    """A code that has a text; a member is written `NAME = code, text`.
+    """Base class of enumerations of codes in which each member has a text.
+
+    A member is written `NAME = code, text`.
 
     Attributes:
         text: meaning of the code.

@@ -13,7 +13,10 @@ from typing import Final
 
 
 class Controlword(IntFlag):
-    """Bits of 6040h. Bits 4, 5, 6 and 9 belong to the mode of operation."""
+    """Bits of the controlword 6040h of a drive.
+
+    The mode of operation defines the meaning of bits 4, 5, 6 and 9.
+    """
 
     SWITCH_ON = 0x0001
     ENABLE_VOLTAGE = 0x0002
@@ -28,7 +31,10 @@ class Controlword(IntFlag):
 
 
 class Statusword(IntFlag):
-    """Bits of 6041h except those of the state. Bits 12 and 13 belong to the mode of operation."""
+    """Bits of the statusword 6041h of a drive, except the bits that contain its state.
+
+    The mode of operation defines the meaning of bits 12 and 13.
+    """
 
     VOLTAGE_ENABLED = 0x0010
     WARNING = 0x0080
@@ -66,7 +72,7 @@ _ANY_QUICK_STOP: Final = (
 
 
 def state_of(statusword: int) -> DriveState | None:
-    """Return the state in a statusword, or None if its bits are not those of a state."""
+    """Return the state of the drive that a statusword contains, or None without a valid state."""
     for state in DriveState:
         if statusword & (0x4F if state in _ANY_QUICK_STOP else 0x6F) == state:
             return state

@@ -93,11 +93,11 @@ def describe(code: int) -> str:
 
 
 class Emcy(NamedTuple):
-    """An EMCY message.
+    """An EMCY message, with which a node reports the beginning or the end of an error.
 
     Attributes:
         code: emergency error code, or 0x0000 for the end of an error.
-        register: error register after the error.
+        register: value of the error register 1001h after the change.
         text: five bytes that are manufacturer-specific.
     """
 

@@ -100,13 +100,13 @@ class LssAddress(NamedTuple):
 
 
 class FastScan(NamedTuple):
-    """A fastscan request.
+    """A request of LSS fastscan, with which a master searches for slaves without a node-ID.
 
     Attributes:
         id_number: requested part of the LSS address.
-        bit_check: lowest compared bit, or 0x80 to restart.
+        bit_check: lowest compared bit, or 0x80 to restart the search.
         sub: number of the part, from 0 (vendor-ID) to 3 (serial number).
-        next_sub: number of the next part.
+        next_sub: number of the part in the next request.
     """
 
     id_number: int
@@ -125,7 +125,12 @@ class FastScan(NamedTuple):
 
 
 def message(command: LssCommand, number: int = 0) -> bytes:
-    """Return a message with a number of up to 32 bits after its command specifier."""
+    """Return the eight bytes of an LSS message.
+
+    Args:
+        command: command specifier.
+        number: number of up to 32 bits after the command specifier.
+    """
     return _MESSAGE.pack(command, number)
 
 

@@ -40,11 +40,11 @@ _NODE_ID_MASK: Final = 0x7F
 
 @dataclass(frozen=True, slots=True)
 class MappedObject:
-    """An entry of a PDO mapping (CiA 301, PDO mapping parameter).
+    """An object that is mapped into a PDO (CiA 301, PDO mapping parameter).
 
     Attributes:
-        index: index of the object, 0x0000..0xFFFF. An index below 0x0020 is a data type, which is a
-            dummy.
+        index: index of the object, 0x0000..0xFFFF. An index below 0x0020 is a data type: the entry
+            is a dummy, which only fills bits.
         sub: sub-index of the object, 0..255.
         bits: number of bits in the PDO.
     """
@@ -65,7 +65,11 @@ class MappedObject:
 
 
 def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
-    """Yield the objects of a mapping (entries such as 6040 0010h), with the bits before them."""
+    """Yield the objects of a PDO mapping, each with the number of bits before it in the PDO.
+
+    Args:
+        mapping: entries of the mapping parameter, such as 6040 0010h.
+    """
     shift = 0
     for value in mapping:
         mapped = MappedObject.parse(value)
@@ -76,7 +80,7 @@ def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
 @mypyc_attr(allow_interpreted_subclasses=True)
 @dataclass(frozen=True, slots=True)
 class PdoDescription:
-    """A PDO with its communication parameter and its mapping.
+    """Description of a PDO: its communication parameter and its mapping.
 
     Attributes:
         cob_id: COB-ID with its flags. Bit 31 is set if the PDO is off.
@@ -112,11 +116,13 @@ class PdoDescription:
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """An entry of an object scanner list, 1FA0h.. (CiA 301, object scanner list).
+    """An entry of an object scanner list, 1FA0h on: an object whose changes a node sends by MPDO.
+
+    The MPDO is in source address mode (SAM). See CiA 301, object scanner list.
 
     Attributes:
-        index: index of the object that a SAM-MPDO producer may send.
-        sub: first sub-index that the producer may send.
+        index: index of the object.
+        sub: first sub-index of the object.
         block: number of consecutive sub-indices.
     """
 
@@ -137,10 +143,13 @@ class Scanned:
 
 @dataclass(frozen=True, slots=True)
 class Dispatched:
-    """An entry of an object dispatching list, 1FD0h.. (CiA 301, object dispatching list).
+    """An entry of an object dispatching list, 1FD0h on: where a node stores data of other nodes.
+
+    The data arrive by MPDO in source address mode (SAM). The entry assigns an object of this node,
+    the consumer, to an object of the producer (CiA 301, object dispatching list).
 
     Attributes:
-        node_id: node-ID of the SAM-MPDO producer.
+        node_id: node-ID of the producer.
         producer_index: index of the object in the producer.
         producer_sub: first sub-index of the object in the producer.
         index: index of the object in the consumer.
@@ -175,11 +184,11 @@ class Dispatched:
 
 @dataclass(frozen=True, slots=True)
 class Mpdo:
-    """A multiplexed PDO (CiA 301, MPDO protocol).
+    """A multiplexed PDO, which names one object and contains its value (CiA 301, MPDO protocol).
 
     Attributes:
-        destination: whether the MPDO is in destination address mode. If it is, the other fields
-            name the consumer, otherwise they name the producer.
+        destination: whether the MPDO is in destination address mode. Then the other fields name an
+            object of the consumer, otherwise an object of the producer.
         node_id: node-ID of the consumer or the producer. In destination address mode 0 means all
             nodes.
         index: index of the object in that node.
@@ -222,7 +231,9 @@ class Mpdo:
 
 
 def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
-    """Pack values into bytes, with the lowest bit first and zeros at the end.
+    """Pack values with given numbers of bits into bytes, as in a PDO.
+
+    The first value begins at the lowest bit of the first byte. The last byte is filled with zeros.
 
     Args:
         fields: pairs of value and number of bits. Excess bits of a value are dropped.

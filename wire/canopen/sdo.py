@@ -51,7 +51,7 @@ _CODES: Final[dict[int, AbortCode]] = {int(code): code for code in AbortCode}
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """Abort SDO transfer, from either side.
+    """The SDO frame "abort SDO transfer", which the client or the server sends.
 
     Attributes:
         code: abort code as an `AbortCode`, or the received number if it is unknown.
@@ -165,7 +165,7 @@ class DownloadInitiateResponse(_Named):
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Up to 7 bytes of a segmented transfer, in either direction.
+    """An SDO frame with up to 7 bytes of a segmented transfer, from the client or the server.
 
     Attributes:
         last: whether no more segments follow.

@@ -206,7 +206,9 @@ def check_frame(frame: bytes) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BlockSegment:
-    """A segment of 7 bytes in a block; `BlockEnd` has the number of unused bytes in the last one.
+    """An SDO frame with one segment of 7 bytes in a block transfer.
+
+    In the last segment some bytes may be unused. `BlockEnd` contains their number.
 
     Attributes:
         seqno: position in the block, 1..127.
@@ -276,7 +278,7 @@ class BlockUploadInitiateResponse(_BlockInitiate):
 
 @dataclass(frozen=True, slots=True)
 class BlockDownloadInitiateResponse:
-    """Response to `BlockDownloadInitiateRequest`.
+    """The server's SDO frame that accepts a block download (`BlockDownloadInitiateRequest`).
 
     Attributes:
         crc: whether the server supports the CRC.
@@ -301,12 +303,13 @@ class BlockDownloadInitiateResponse:
 
 @dataclass(frozen=True, slots=True)
 class BlockUploadInitiateRequest:
-    """Initiate SDO block upload.
+    """The client's SDO frame that starts a block upload ("initiate SDO block upload").
 
     Attributes:
         crc: whether the client supports the CRC.
         block_size: number of segments in the first block, 1..127.
-        threshold: protocol switch threshold, or 0 to forbid the switch to another upload.
+        threshold: protocol switch threshold: a number of bytes up to which the server may switch to
+            another kind of upload, or 0 to forbid the switch.
     """
 
     index: int
@@ -342,7 +345,7 @@ class BlockStart:
 
 @dataclass(frozen=True, slots=True)
 class BlockAcknowledge:
-    """Acknowledgement of a block, in either direction.
+    """An SDO frame with which the receiver of a block acknowledges its segments.
 
     Attributes:
         ackseq: number of the last segment received in sequence, or 0 for none.
@@ -364,7 +367,7 @@ class BlockAcknowledge:
 
 @dataclass(frozen=True, slots=True)
 class BlockEnd:
-    """End of a block transfer from the sender of the data, in either direction.
+    """An SDO frame with which the sender of the data ends a block transfer.
 
     Attributes:
         fill: number of unused bytes of the last segment, 0..7.
@@ -405,5 +408,5 @@ _crc: Final = crcmod.mkCrcFun(0x1_1021, initCrc=0, rev=False, xorOut=0)
 
 
 def crc16(data: bytes) -> int:
-    """Return the CRC over the data of a block transfer, without the fill of the last segment."""
+    """Return the CRC of the data of an SDO block transfer, without the unused bytes at the end."""
     return _crc(data)

@@ -19,7 +19,7 @@ from tickrig.wire.rrc.message import all_digits, check_digit, read_hex, read_sig
 
 
 class Parameter:
-    """A parameter of a command, with its number of digits and allowed values.
+    """Describes one parameter of an RRC command: its number of hex digits and its allowed values.
 
     Attributes:
         width: number of hex digits, 1 or 2.
@@ -44,7 +44,7 @@ class Parameter:
         return value
 
     def write(self, value: int) -> bytes:
-        """Return the hex digits of a value in lower case, as in the samples of the manual."""
+        """Return a value as hex digits in lower case, as in the samples of the manual."""
         return b"%0*x" % (self.width, value & 0xFF)
 
     def checked(self, value: int) -> int:
@@ -69,7 +69,9 @@ class UnknownCommand(FramingError):  # noqa: N818 - the manual's word: CommandUn
 
 
 class BadParameters(FieldError):  # noqa: N818 - what came
-    """A known command has a wrong number of digits, a bad digit or a bad value.
+    """Error in a received line: the command is known, but its parameters are invalid.
+
+    The number of digits is wrong, a digit is not hexadecimal, or a value is not allowed.
 
     Attributes:
         name: name of the command.
@@ -111,7 +113,11 @@ class Command:
         return tuple([getattr(self, name) for name in names])
 
     def encode(self, *, check: bool = False) -> bytes:
-        """Return the bytes of the line with its LF, and with CHECK if stablemode requires it."""
+        """Return the line that sends this command, with its LF.
+
+        Args:
+            check: whether to add the CHECK digit, which the mode `stablemode` requires.
+        """
         digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
         message = self.name + self.literal + b"".join(digits)
         return message + (check_digit(message) if check else b"") + b"\n"
@@ -119,7 +125,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Limit(Command):
-    """Drive by the stick, within limits.
+    """RRC command `limit`: drive by the stick, but limit its translation v and rotation w.
 
     Attributes:
         v_pct: parameter #1, translation input limit, 0..100 %.
@@ -173,7 +179,10 @@ class Date(Command):
 
 @dataclass(frozen=True, slots=True)
 class SpeedMode(Command):
-    """Choose the speed mode, 1 (slowest) to 5; `locked` = 1 locks the speed buttons."""
+    """RRC command `speedmode`: choose the speed mode, from 1 (slowest) to 5.
+
+    `locked` = 1 locks the speed buttons of the wheelchair.
+    """
 
     name = b"speedmode"
     parameters = (_SPEED_MODE, _FLAG)
@@ -235,10 +244,12 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return the settings after this command; #8 to #10 out of range keep their former values.
+        """Return the settings that are valid after this command.
+
+        A value of #8 to #10 that is out of range does not change the former value (DECISION R14).
 
         Args:
-            former: settings before the command (DECISION R14).
+            former: settings before the command.
 
         >>> Joystick(neutral_pct=255, switch_deg=20).after(Joystick(neutral_pct=7)).values()[7:]
         (7, 20, 45)
@@ -254,7 +265,10 @@ class Joystick(Command):
 
 @dataclass(frozen=True, slots=True)
 class Watchdog(Command):
-    """Stop VR2 after a time without a correct command: 0..255 x 10 ms, where 0 is off."""
+    """RRC command `watchdog`: stop VR2 if no correct command arrives for a time.
+
+    The time is 0..255 x 10 ms. 0 switches the watchdog off.
+    """
 
     name = b"watchdog"
     parameters = (_BYTE,)
@@ -274,7 +288,10 @@ class StableMode(Command):
 
 @dataclass(frozen=True, slots=True)
 class Status(Command):
-    """Switch the stream of SA lines (type A is the only one of version 1.0)."""
+    """RRC command `status`: switch the periodic SA lines, which report the status, on or off.
+
+    Type A is the only type of status line in version 1.0.
+    """
 
     name = b"status"
     literal = b"A"
@@ -292,7 +309,10 @@ class PowerOff(Command):
 
 @dataclass(frozen=True, slots=True)
 class Beep(Command):
-    """Sound the buzzer: five pairs of on and off times, 0..255 x 10 ms each."""
+    """RRC command `beep`: sound the buzzer with five pairs of on and off times.
+
+    Each time is 0..255 x 10 ms.
+    """
 
     name = b"beep"
     parameters = (_BYTE,) * 10
@@ -316,7 +336,10 @@ _NAME: Final = re.compile(b"|".join(COMMANDS))  # no name is a prefix of another
 
 
 def parse_command(message: bytes) -> Command:
-    """Return the command in a line without line end and CHECK.
+    """Parse an RRC command.
+
+    Args:
+        message: line without its line end and without CHECK.
 
     Raises:
         UnknownCommand: the name is unknown. Names are lower case.

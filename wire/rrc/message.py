@@ -14,12 +14,15 @@ _HEX_DIGITS: Final = {bytes([code]): int(chr(code), 16) for code in b"0123456789
 
 
 def all_digits(width: int) -> list[bytes]:
-    """Return all texts of a given number of hex digits, in upper, lower and mixed case."""
+    """Return all texts of a given number of hex digits, in upper, lower and mixed case.
+
+    Tables of all valid parameters are made from them.
+    """
     return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
 
 
 def read_hex(digits: bytes) -> int:
-    """Read one or two hex digits of either case.
+    """Return the number that one or two hex digits stand for, in upper or lower case.
 
     Raises:
         FieldError: a character is not a hex digit.
@@ -56,7 +59,9 @@ def check_digit(message: bytes) -> bytes:
 
 
 def strip_check(line: bytes) -> bytes:
-    """Return a line without the CHECK digit at its end.
+    """Verify the CHECK digit at the end of an RRC line, and return the line without it.
+
+    CHECK is the checksum of the line.
 
     Raises:
         ChecksumError: CHECK is missing, wrong or not a hex digit.
@@ -97,7 +102,9 @@ PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
 
 
 def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
-    """Return the number of lines per second that a host may send while VR2 runs.
+    """Return the number of lines per second that a host may send to an RRC while VR2 runs.
+
+    The RRC would stop VR2 if it could not keep up with more lines.
 
     Args:
         stable: whether OK lines are omitted (stablemode).

@@ -59,7 +59,10 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Reply `ER:reason` with the name of a command, or with the fault of the line."""
+    """RRC reply `ER:reason`: a command was refused.
+
+    The reason is the name of the command, or a fault of the line.
+    """
 
     reason: str
 
@@ -70,7 +73,10 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Event `EV:name`: the state of RRC or VR2 has changed. Newer firmware may send other names."""
+    """RRC line `EV:name`: the state of the RRC or of VR2 has changed.
+
+    Newer firmware may send names that the manual does not list.
+    """
 
     name: str
 
@@ -126,14 +132,14 @@ class StatusA:
         speed_mode: int,
         counts: tuple[int, int, int],
     ) -> bytes:
-        r"""Return the line with these values, with its CHECK and LF.
+        r"""Return the SA line (status line) of an RRC with the given values, with its CHECK and LF.
 
         Args:
-            stick_pct: #1 and #2.
-            out_pct: #3 and #4.
-            gauge: #5.
-            speed_mode: #6.
-            counts: #7, #8 and #9.
+            stick_pct: translation and rotation of the stick, #1 and #2.
+            out_pct: translation and rotation for the motors, #3 and #4.
+            gauge: level of the battery gauge, #5.
+            speed_mode: speed mode, #6.
+            counts: counters of the buttons, #7, #8 and #9.
 
         >>> StatusA.line((100, 0), (50, 0), 10, 1, (0, 0, 0))
         b'SA:64003200A1000F\n'
@@ -159,7 +165,10 @@ class StatusA:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Any other line: the answer to `device`, `version`, `date`, or a line of newer firmware."""
+    """Any other line of an RRC: an answer to `device`, `version` or `date`.
+
+    A line of newer firmware that is unknown here is also a `Text`.
+    """
 
     text: str
 
@@ -178,7 +187,7 @@ _BY_PREFIX: Final[dict[bytes, type[Ok] | type[Refusal] | type[Event]]] = {
 
 
 def parse_reply(line: bytes) -> Reply:
-    """Read a line without its LF.
+    """Parse a line that an RRC has sent, without its LF.
 
     Raises:
         FramingError: an SA line has a wrong length.

@@ -138,7 +138,7 @@ class Checksum(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LiteFrame:
-    """A frame in either direction.
+    """A frame of RTC-Lite between a proxy and a device: a command and its data.
 
     Attributes:
         command: command bytes Cmnd0 and Cmnd1.
@@ -173,11 +173,10 @@ _COMMANDS: Final = {command.value: command for command in LiteCommand}
 
 @dataclass(slots=True)
 class LiteDecoder:
-    """Reads the frames of one direction (DECISION L6, L7).
+    """Finds the RTC-Lite frames of one direction in a stream of received bytes (DECISION L6, L7).
 
-    The decoder has no clock. The owner of the decoder watches the line. It calls `clear` after 100
-    ms without a byte if a frame has `begun`, or after 20 ms without a byte if the decoder is
-    `lost`.
+    The decoder has no clock. Its owner watches the line and calls `clear` after 100 ms without a
+    byte if a frame has `begun`, or after 20 ms without a byte if the decoder is `lost`.
 
     Args:
         layouts: layouts of the frames: `REQUESTS` at the device, `REPLIES` at the proxy.

@@ -22,7 +22,7 @@ PORT_COUNTS_BYTES: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class LitePortData:
-    """Data on its way to an in-port (PS) or from an out-port (QV).
+    """Data of the frame that sends a value to an in-port (PS) or from an out-port (QV).
 
     Attributes:
         name: name of the port, as on the wire.
@@ -45,7 +45,9 @@ class LitePortData:
 
 @dataclass(frozen=True, slots=True)
 class LitePortProfile:
-    """Description of a port by the device (PP, QQ).
+    """Data of the frame with which a device describes one of its ports.
+
+    The frame is PP for an in-port and QQ for an out-port.
 
     Attributes:
         code: letter of the type of the port, which may be unknown.
@@ -62,11 +64,11 @@ class LitePortProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteComponentProfile:
-    """The message after the ports, with their numbers and the type of the component (CZ).
+    """Data of the reply (CZ) that ends a component's profile, after a frame for each port.
 
     Attributes:
-        in_ports: number of PP frames sent.
-        out_ports: number of QQ frames sent.
+        in_ports: number of PP frames that were sent.
+        out_ports: number of QQ frames that were sent.
         type_name: type of the component.
     """
 
@@ -81,11 +83,11 @@ class LiteComponentProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteReply:
-    """The reply of a device.
+    """The reply of an RTC-Lite device to a request: a status, and further bytes.
 
     Attributes:
         status: status as a `LiteStatus`, or an unknown number.
-        fields: bytes after the status: state, sequence number, context type.
+        fields: bytes after the status: state, sequence number or context type.
     """
 
     status: int
@@ -102,7 +104,11 @@ class LiteReply:
 
 
 def parse_port_data(data: bytes) -> LitePortData:
-    """Read the data of PS or QV; raise FramingError if the lengths do not fit."""
+    """Parse the data of a frame that sends the value of a port (PS or QV).
+
+    Raises:
+        FramingError: the lengths of name and value do not match the frame.
+    """
     size = 2 + data[0] + data[1] if len(data) >= PORT_COUNTS_BYTES else PORT_COUNTS_BYTES
     if len(data) != size:
         raise FramingError(f"{data.hex(' ')} has {len(data)} bytes, {size} were expected")
@@ -111,14 +117,22 @@ def parse_port_data(data: bytes) -> LitePortData:
 
 
 def parse_port_profile(data: bytes) -> LitePortProfile:
-    """Read the data of PP or QQ; raise FramingError if the length does not fit."""
+    """Parse the data of a frame that describes a port (PP or QQ).
+
+    Raises:
+        FramingError: the length of the name does not match the frame.
+    """
     if not data or not 1 <= data[0] == len(data) - 1:
         raise FramingError(f"{data.hex(' ')} is not a length, a letter and a name")
     return LitePortProfile(chr(data[1]), data[2:])
 
 
 def parse_component_profile(fields: bytes) -> LiteComponentProfile:
-    """Read the fields of the reply to CZ; raise FramingError if their length does not fit."""
+    """Parse the fields of the reply that ends a component's profile (CZ).
+
+    Raises:
+        FramingError: the length of the name does not match the fields.
+    """
     if len(fields) < 3 or len(fields) != 3 + fields[2]:
         raise FramingError(f"{fields.hex(' ')} is not two numbers, a length and a name")
     return LiteComponentProfile(fields[0], fields[1], fields[3:])

@@ -320,12 +320,12 @@ _Kinds = dict[int, ObjectCode]
 
 @dataclass(frozen=True, slots=True)
 class EdsDevice:
-    """The device described by a file.
+    """The device that an EDS or DCF file describes.
 
     Attributes:
         info: vendor, product and bit rates.
-        entries: entries of all objects.
-        objects: names and kinds by index.
+        entries: descriptions of the entries of all objects.
+        objects: names and object codes by index.
         node_id: node-ID of a DCF, or None if missing.
         bit_rate: bit rate of a DCF in bit/s, or None if missing.
     """
@@ -338,13 +338,13 @@ class EdsDevice:
 
 
 def read_device(file: EdsFile) -> EdsDevice:
-    """Return the device of a file; invalid parts are skipped and added to the errors of the file.
+    """Return the device that an EDS or DCF file describes.
 
-    A deviation from the standard with a clear meaning becomes a warning that names the value used:
-    C suffixes, empty and missing keywords, CompactSubObj in a RECORD, texts beyond ASCII. A
-    ParameterValue (DCF) is used as power-on value. ObjFlags concern configuration tools, not the
-    device, and are dropped. Objects implied by CompactPDO and objects of connected modules are
-    included.
+    Invalid parts are skipped and added to the errors of the file. A deviation from the standard
+    with a clear meaning becomes a warning that names the value used: C suffixes, empty and missing
+    keywords, CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) is used as
+    power-on value. ObjFlags concern configuration tools, not the device, and are dropped. Objects
+    implied by CompactPDO and objects of connected modules are included.
     """
     kinds = _kinds(file)
     entries = list(_entries(file, kinds))

@@ -22,7 +22,7 @@ _OCTETS: Final = DataType.OCTET_STRING
 
 
 class StandardObject(NamedTuple):
-    """Properties of one object, or of each object in a range.
+    """What CiA 301 requires of an object, or of each object in a range, to check an EDS.
 
     Attributes:
         composed: whether the object has sub-indices.
@@ -80,7 +80,7 @@ _RANGES: Final = (
 
 
 def standard_object(index: int) -> StandardObject | None:
-    """Return the properties of an object in CiA 301, or None if nothing is checked."""
+    """Return what CiA 301 requires of the object with an index, or None if nothing is checked."""
     for area, found in _RANGES:
         if index in area:
             return found
@@ -135,10 +135,12 @@ _MISSING: Final = {
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
 ) -> object_table.EntryDescription:
-    """Read an entry; record missing keywords and the values used instead.
+    """Read the description of one entry from its section of an EDS.
+
+    If a keyword is missing, the file collects a warning or error with the value used instead.
 
     Args:
-        file: file that collects errors.
+        file: the EDS, which collects errors and warnings.
         section: section of the entry. For an entry of a compact array, it is the section of the
             array.
         index: index of the object.
@@ -291,16 +293,16 @@ def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
 def read_value_beside(
     file: EdsFile, index: int, sub: int, kind: DataType
 ) -> tuple[bytes | None, bool]:
-    """Return the value in a DCF for an entry without a section, or None if missing.
+    """Return the value that a DCF gives to an entry of a compact array, which has no section.
 
     Args:
-        file: file that collects errors.
-        index: index of the object. The value is in `[INDEXValue]`.
+        file: the DCF, which collects errors.
+        index: index of the object. The value is in the section `[INDEXValue]`.
         sub: sub-index of the entry.
         kind: data type of the value.
 
     Returns:
-        The bytes, and whether to add the node-ID.
+        The bytes, or None if the DCF has no value; and whether to add the node-ID.
     """
     place = f"{index:04X}Value"
     said = _text(file, place, str(sub), kind)
@@ -429,14 +431,16 @@ def object_kind(file: EdsFile, section: str, with_subs: bool) -> object_table.Ob
 def read_object(
     file: EdsFile, head: str, index: int, kind: object_table.ObjectCode, subs: list[tuple[str, int]]
 ) -> Iterator[object_table.EntryDescription]:
-    """Read the entries of one object; sections of sub-indices override a compact description.
+    """Yield the descriptions of all entries of one object of an EDS.
+
+    If the object has a compact description (CompactSubObj), sections of sub-indices override it.
 
     Args:
-        file: file that collects errors.
+        file: the EDS, which collects errors.
         head: section of the object.
         index: index of the object.
-        kind: kind of the object.
-        subs: sections of the sub-indices.
+        kind: object code: variable, array, record and others.
+        subs: sections of the sub-indices, each with its sub-index.
     """
     if kind in VARIABLES:
         yield read_entry(file, head, index, 0)

@@ -47,7 +47,7 @@ _DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
 class Finding(NamedTuple):
-    """An error or warning in an EDS file.
+    """An error or warning about an EDS file, with its position in the file.
 
     Attributes:
         file: name of the file.
@@ -71,7 +71,10 @@ class Finding(NamedTuple):
 
 
 def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
-    """Yield the findings in EDS files, one per line; a finding in many sections occurs once."""
+    """Yield errors and warnings about EDS files as lines of text.
+
+    If many sections of a file have the same finding, there is one line with their number.
+    """
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):
         alike.setdefault((finding.file, finding.reason), []).append(finding)
@@ -155,7 +158,7 @@ class EdsFile:
 
     @property
     def is_dcf(self) -> bool:
-        """Whether the file is a DCF, by its name or because it has a node-ID."""
+        """Whether the file is a DCF: its name ends as that of a DCF, or it has a node-ID."""
         return self.name.lower().endswith(_DCF_ENDINGS) or "DeviceComissioning" in self.sections
 
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
@@ -169,7 +172,11 @@ class EdsFile:
         self._warnings[Finding(self.name, section, reason, line, rule)] = None
 
     def line(self, section: str, key: str = "") -> int:
-        """Return the line number of a keyword, or else of its section, or else 0."""
+        """Return the line number of a keyword in a section.
+
+        If the file does not have the keyword, return the line of the section, or 0 without the
+        section.
+        """
         place = self._places.get((section, key.lower()))
         return place or self._places.get((section, ""), 0)
 
@@ -183,11 +190,11 @@ class EdsFile:
         return key.lower() in self.sections.get(section, {})
 
     def word(self, section: str, key: str) -> str:
-        """Return the value of a keyword that is not a free text, without a trailing comment.
+        """Return the value of a keyword that is a number or a word, without a trailing comment.
 
-        In CiA 306 comments are separate lines. Readers also accept ` ;` after any value. After a
-        number or an access type, `;`, `#` and `//` start a comment, too, with a warning. Unlike in
-        a text, these characters have no other meaning there.
+        In CiA 306 comments are separate lines, but readers also accept ` ;` after any value. After
+        a number or an access type, `;`, `#` and `//` start a comment, too, with a warning, because
+        these characters have no other meaning there. In a text they may be part of the text.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)
@@ -197,7 +204,10 @@ class EdsFile:
         return said
 
     def numeric(self, section: str, key: str) -> str:
-        """Return the text of a number in CiA 306 notation; warn if the file differs."""
+        """Return the text of a number, converted to the notation of CiA 306.
+
+        If the file has another notation, a warning is added to it.
+        """
         text = self.value(section, key)
         if eds_value.is_plain_number(text):
             return text
@@ -217,11 +227,18 @@ class EdsFile:
         high: int = 0xFFFF_FFFF,
         words: Mapping[str, int] = _NO_WORDS,
     ) -> int:
-        """Return the number of a keyword.
+        """Return the value of a keyword as a number.
 
-        The default is used if the keyword is missing. The default is used with a warning if the
-        keyword is empty, not a number, or not in `low` to `high`. A word of `words` (lower case)
-        stands for its number, with a warning.
+        The default is used if the keyword is missing. It is used with a warning if the keyword is
+        empty, not a number, or not in `low` to `high`.
+
+        Args:
+            section: section of the keyword.
+            key: the keyword.
+            default: number that is used instead of a missing or invalid value.
+            low: smallest allowed number.
+            high: largest allowed number.
+            words: words in lower case that are accepted in place of a number, with a warning.
         """
         text = self.numeric(section, key)
         if not text:
@@ -332,11 +349,15 @@ _LETTERS_850: Final = frozenset((*range(0x80, 0x9B), *range(0xA0, 0xA6)))
 
 
 def encoding_of(data: bytes) -> str:
-    r"""Return the encoding of a file, as a name in Python.
+    r"""Detect the encoding of a text file, and return its name in Python.
 
     The encoding is UTF-16 if the file has the byte order mark or if every other byte at the start
     is zero. It is UTF-8 if the file is valid UTF-8. Otherwise it is a single-byte encoding: CP850
-    if CP850 gives letters within words where Windows-1252 does not, or else Windows-1252.
+    if more of the bytes within words are letters of CP850 than of Windows-1252, or else
+    Windows-1252.
+
+    Args:
+        data: content of the file.
 
     >>> encoding_of(b"[\0F\0"), encoding_of("µ".encode()), encoding_of(b"\xb5")
     ('utf-16-le', 'utf-8', 'cp1252')
@@ -359,7 +380,7 @@ def encoding_of(data: bytes) -> str:
 
 
 def decode_text(data: bytes, encoding: str = "") -> str:
-    r"""Return the text of a file in any encoding, without a byte order mark.
+    r"""Decode the content of a text file, and remove a byte order mark.
 
     Args:
         data: content of the file.

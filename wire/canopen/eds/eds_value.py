@@ -48,13 +48,13 @@ _LINE_COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
 class EdsLine(NamedTuple):
-    """A line with its parsed content.
+    """A line of an EDS file with its parsed content.
 
     Attributes:
         number: line number, counted from 1.
         text: the line as written, without its end.
         section: section of the line in CiA 306 spelling, or empty before the first section.
-        title: title, as written, of the section that the line starts, or empty in other lines.
+        title: title, as written, if the line starts a section, or else empty.
         key: keyword of the line, or empty in other lines.
         value: value of a keyword. `#` and `//` are kept, because a text may contain them.
         content: the line without a comment.
@@ -197,7 +197,7 @@ _TRUTH: Final = {"true": True, "false": False}
 
 
 def without_comment(text: str) -> str:
-    """Return a number or a word without a trailing comment.
+    """Return a number or a word of an EDS file without a trailing comment.
 
     `#`, `//` and `;` start a comment, with or without a blank before them.
 
@@ -210,14 +210,14 @@ def without_comment(text: str) -> str:
 
 
 def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
-    """Read a value.
+    """Read a value of an EDS file, such as a default, as a value of its data type.
 
     Args:
         kind: data type of the value.
         text: text, which is not empty.
 
     Returns:
-        The value, and whether to add the node-ID.
+        The value, and whether to add the node-ID (`$NODEID+...`).
 
     Raises:
         ValueError: the text is not a value of this type.
@@ -283,12 +283,15 @@ def parse_number(text: str) -> int:
 
 
 def is_plain_number(text: str) -> bool:
-    """Return whether a text is empty or a number in CiA 306 notation, as nearly all are."""
+    """Return whether a text is already a number in CiA 306 notation, or empty.
+
+    This is a fast check, because nearly all numbers of EDS files are.
+    """
     return _PLAIN.fullmatch(text) is not None
 
 
 def plain_numbers(text: str) -> str:
-    """Return numbers in CiA 306 notation.
+    """Convert a number to the notation of CiA 306.
 
     The function removes C suffixes, blanks and underscores within numbers, trailing comments,
     leading zeros that do not form an octal number, a plus sign, and decimals that are 0. Assembler
@@ -315,13 +318,16 @@ def plain_numbers(text: str) -> str:
 
 
 def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float | None:
-    """Read a limit; return None if the type has no limits or the limit does not restrict it.
+    """Read a LowLimit or HighLimit of an EDS file.
 
     Args:
         kind: data type of the limited value.
         text: text, which is not empty.
         upper: whether the limit is HighLimit. A limit beyond the type, which has no effect, is
             kept.
+
+    Returns:
+        The limit, or None if values of the type have no limits or the limit depends on the node-ID.
 
     Raises:
         ValueError: the text is not a number of at most 64 bits.
@@ -346,7 +352,10 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
 
 
 def format_limit(kind: DataType, limit: int | float) -> str:
-    """Return a limit as text. A float is written as its bytes if they represent it exactly."""
+    """Return a limit as it is written to an EDS file.
+
+    A float is written as its bytes if they represent it exactly.
+    """
     with suppress(ValueError):
         if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:
             return format_value(kind, data)
@@ -354,9 +363,15 @@ def format_limit(kind: DataType, limit: int | float) -> str:
 
 
 def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
-    """Return a value as text; the caller detects losses by reading the text again.
+    """Return a value as it is written to an EDS file.
 
-    A float is written as its bytes, as Lely's tools require, but 0 is always written as 0.
+    A float is written as its bytes, as Lely's tools require, but 0 is always written as 0. Some
+    values cannot be expressed exactly. The caller detects this by reading the text again.
+
+    Args:
+        kind: data type of the value.
+        data: bytes of the value.
+        relative: whether the node-ID is added to the value.
 
     >>> format_value(DataType.UNSIGNED32, (0x180).to_bytes(4, "little"), relative=True)
     '$NODEID+0x180'

@@ -49,11 +49,11 @@ class Table(Protocol):
 def write_eds(
     table: Table, info: object_table.DeviceInfo = _NO_INFO, *, file_name: str = ""
 ) -> str:
-    """Write the objects with their default values.
+    """Return the text of an EDS that describes the given objects with their default values.
 
     Properties without a CiA 306 keyword are written as comments if needed: `MaxBytes` limits a
     string or domain, `DefaultBytes` gives a default that no text can express. The file is dated
-    1970, so the same dictionary gives the same text.
+    1970, so that the same dictionary always gives the same text.
 
     Args:
         table: the objects.
@@ -79,7 +79,7 @@ def write_dcf(
     values: Mapping[int, bytes],
     info: object_table.DeviceInfo = _NO_INFO,
 ) -> str:
-    """Return the text of a DCF with the default and present values of one node.
+    """Return the text of a DCF: the objects of an EDS with the present values of one node.
 
     Args:
         table: the objects.
@@ -205,7 +205,7 @@ def _object(
 
 
 def entry_lines(entry: object_table.EntryDescription) -> list[str]:
-    """Return the section of one sub-index.
+    """Return the lines of an EDS that describe one sub-index.
 
     Raises:
         ValueError: an EDS cannot hold a name or an access.
@@ -240,7 +240,7 @@ def _variable(
 
 
 def access_type(entry: object_table.EntryDescription) -> str:
-    """Return the AccessType of an entry.
+    """Return the access of an entry as a word of CiA 306 for an EDS, such as `rw` or `const`.
 
     Raises:
         ValueError: CiA 306 has no word for the access.

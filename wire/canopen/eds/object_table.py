@@ -30,12 +30,12 @@ class Access(Flag):
 
     @classmethod
     def from_eds(cls, access_type: str, *, mappable: bool = False) -> Access:
-        """Return the access of an entry of an EDS (CiA 306).
+        """Return the access that an entry has according to its EDS (CiA 306).
 
         Args:
             access_type: access in CiA 306 notation: ro, wo, rw, rwr, rww or const, in upper or
                 lower case.
-            mappable: whether PDOs may carry the entry (PDOMapping).
+            mappable: whether the entry can be mapped into PDOs (PDOMapping).
 
         Raises:
             ValueError: the access is unknown.
@@ -158,7 +158,7 @@ class EntryDescription:
         self.unit, self.factor = unit, factor
 
     def with_default(self, default: Value, *, relative: bool = False) -> EntryDescription:
-        """Return the same entry with another power-on value.
+        """Return a copy of this description with another power-on value.
 
         Args:
             default: power-on value, or its bytes.
@@ -186,7 +186,9 @@ class EntryDescription:
         return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
 
     def power_on_data(self, node_id: int) -> bytes:
-        """Return the bytes of the default, with the node-ID added if it is relative.
+        """Return the bytes that the entry has at power-on in a given node.
+
+        They are the bytes of the default. If it is relative, the node-ID is added.
 
         Args:
             node_id: node-ID, 1 to 127.
@@ -211,13 +213,13 @@ def _nearest_to_zero(kind: DataType, low: int | float | None, high: int | float 
 
 
 class Element(NamedTuple):
-    """One sub-index of a record.
+    """Description of one sub-index of a record, for `ObjectTable.record`.
 
     Attributes:
         sub: sub-index, 1..254.
         name: name, as in the EDS.
         kind: data type of the element.
-        access: access of the bus.
+        access: access that the bus has to the element.
         default: power-on value.
         relative: whether the node-ID is added to the default.
     """
@@ -232,10 +234,12 @@ class Element(NamedTuple):
 
 @mypyc_attr(serializable=True)
 class ObjectTable:
-    """Collects objects, and returns them sorted by index and sub-index.
+    """Builds the description of an object dictionary in code, object by object.
+
+    Iterating over the table yields the descriptions of all entries, sorted by index and sub-index.
 
     Attributes:
-        objects: names and kinds by index.
+        objects: names and object codes by index.
 
     >>> table = ObjectTable()
     >>> table.variable(0x1000, "Device type", DataType.UNSIGNED32, RO, 0x191)
@@ -312,9 +316,16 @@ class ObjectTable:
         count: int | None = None,
         code: ObjectCode = ObjectCode.RECORD,
     ) -> None:
-        """Add a record; sub-index 0 holds `count`, by default the highest sub-index.
+        """Add a record to the table.
 
-        With `code`, the object is an array whose elements have individual names and defaults.
+        Args:
+            index: index of the record.
+            name: name of the record.
+            elements: descriptions of its sub-indices from 1 on.
+            count_access: access of sub-index 0.
+            count: value of sub-index 0, or None for the highest sub-index of the elements.
+            code: object code. An array may also be added here, if its elements have individual
+                names and defaults.
         """
         rows = list(elements)
         highest = max(row.sub for row in rows) if count is None else count
@@ -338,7 +349,7 @@ BIT_RATES: Final = frozenset(1_000 * kbit for kbit in BIT_RATES_KBIT)
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """Vendor, product and bit rates.
+    """Identity of a device in an EDS file: vendor, product and supported bit rates.
 
     Attributes:
         vendor_name: name of the vendor, or empty if unknown.
@@ -369,18 +380,18 @@ _MAPPED: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
-    """Values of communication objects that differ between devices.
+    """Values of the communication objects (1000h..1FFFh) in which one device differs from another.
 
     Attributes:
         device_type: value of 1000h.
-        name: value of 1008h.
-        hardware: value of 1009h.
-        software: value of 100Ah.
+        name: value of 1008h, the device name.
+        hardware: value of 1009h, the hardware version.
+        software: value of 100Ah, the software version.
         product_code: value of 1018h:02. The vendor-ID is 0, which belongs to no vendor.
         rpdos: descriptions of the RPDOs, from 1400h on.
         tpdos: descriptions of the TPDOs, from 1800h on.
-        revision: value of 1018h:03.
-        heartbeat_ms: value of 1017h, in ms.
+        revision: value of 1018h:03, the revision number.
+        heartbeat_ms: value of 1017h, the producer heartbeat time, in ms.
     """
 
     device_type: int

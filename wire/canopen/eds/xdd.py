@@ -63,7 +63,7 @@ _FILE: Final = {
 
 
 class XddError(ValueError):
-    """The XML cannot be read.
+    """Error in an XDD or XDC file, because of which the XML cannot be read.
 
     Attributes:
         line: line number, or 0 for the file as a whole.
@@ -92,7 +92,7 @@ def is_xml(text: str) -> bool:
 
 
 def xdd_lines(text: str) -> list[EdsLine]:
-    """Return the lines of an EDS equivalent to an XDD or XDC.
+    """Convert an XDD or XDC file to the lines of an equivalent EDS.
 
     Raises:
         XddError: the text is not well-formed, has a document type, or has no CANopen object list.
@@ -105,7 +105,7 @@ def xdd_lines(text: str) -> list[EdsLine]:
 
 
 def read_xml(text: str) -> list[Element]:
-    """Return all elements of XML in the order of the file.
+    """Return all elements of an XML text in their order, with their line numbers.
 
     Raises:
         XddError: the text is not well-formed, has a document type, or is nested deeper than 64.
