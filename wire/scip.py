@@ -93,7 +93,7 @@ _MOST: Final = 4
 
 
 def encode_numbers(values: Sequence[int], width: int) -> bytes:
-    """Return numbers one after the other, each in `width` (1 to 4) characters.
+    """Encode numbers in the SCIP notation, each as `width` (1 to 4) characters of 6 bits.
 
     Raises:
         FieldError: a number needs more characters.
@@ -113,7 +113,7 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
 
 
 def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
-    """Return the numbers encoded in characters; each number has `width` (1 to 4) characters.
+    """Decode numbers from the SCIP notation, each from `width` (1 to 4) characters of 6 bits.
 
     Raises:
         FieldError: a character is invalid.
@@ -150,7 +150,12 @@ def _line_sum(data: bytes) -> bytes:
 
 
 def with_sum(line: bytes, summed: bytes | None = None) -> bytes:
-    """Return a line followed by its sum, or by the sum of `summed` if given."""
+    """Append the checksum character of SCIP to a line, and return the result.
+
+    Args:
+        line: the line.
+        summed: text over which the sum is computed, or None for the whole line.
+    """
     return line + _line_sum(line if summed is None else summed)
 
 
@@ -193,10 +198,10 @@ SIZES: Final[Mapping[str, tuple[int, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command that was received or is to be sent. The command is not validated.
+    """A command of SCIP 2.0 for a URG sensor. It is not validated.
 
     Attributes:
-        symbol: symbol of two letters.
+        symbol: symbol of two letters, such as `MD`.
         parameters: all parameters, one after the other.
         string: string with its semicolon, or empty without a string.
     """
@@ -238,14 +243,27 @@ WIDTHS: Final = {"D": 3, "S": 2}
 
 
 def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
-    """Return the lines of a scan after the status; FieldError for a number that does not fit."""
+    """Return the lines with the data of a scan, which follow the status in a reply of SCIP 2.0.
+
+    Args:
+        time_ms: time stamp of the scan, in ms.
+        distances: distances in mm.
+        width: number of characters of a distance.
+
+    Raises:
+        FieldError: a number does not fit into its characters.
+    """
     data = encode_numbers(distances, width)
     blocks = [data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES)]
     return tuple(with_sum(line) for line in (encode_number(time_ms, _TIME_WIDTH), *blocks))
 
 
 def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]]:
-    """Return the time stamp in ms and the distances in mm of a scan.
+    """Return the time stamp in ms and the distances in mm from the data lines of a scan.
+
+    Args:
+        lines: lines after the status of a reply.
+        width: number of characters of a distance.
 
     Raises:
         ChecksumError: the sum of a line is wrong.
@@ -279,7 +297,11 @@ def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> byt
 
 
 def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
-    """Return the lines of the answer to G; raise FieldError for a number that does not fit."""
+    """Return the data lines of the answer to a G command of SCIP 1.1, which have no sums.
+
+    Raises:
+        FieldError: a distance does not fit into its characters.
+    """
     data = encode_numbers(distances, _WIDTH)
     return tuple(data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES))
 
@@ -292,10 +314,11 @@ MOST_BYTES: Final = 16_384
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """A reply of a sensor.
+    """A reply of a URG sensor in SCIP 2.0.
 
     Attributes:
-        echo: command, in which the number of scans is replaced by the number of remaining scans.
+        echo: command that is answered. In replies with scans it contains the number of remaining
+            scans.
         status: status of two characters.
         lines: lines after the status, as received, each with its sum.
     """
@@ -311,7 +334,10 @@ class Reply:
 
     @classmethod
     def parse(cls, data: bytes) -> Reply:
-        """Read a reply without its last two line ends.
+        """Parse a reply of a sensor.
+
+        Args:
+            data: the reply without its last two line ends.
 
         Raises:
             FramingError: there is no echo or no status.
@@ -331,10 +357,10 @@ class Reply:
 
 @mypyc_attr(serializable=True)
 class ReplySplitter:
-    """Collects bytes into whole replies, however they are split into chunks.
+    """Splits a stream of received bytes into SCIP replies, however it is divided into chunks.
 
     Attributes:
-        garbled: number of invalid replies.
+        garbled: number of invalid replies, which were dropped.
     """
 
     def __init__(self) -> None:
@@ -357,13 +383,19 @@ class ReplySplitter:
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
-    """Return a line for each key and value; the sum does not include the semicolon."""
+    """Return `KEY:VALUE;` lines with their sums, as in the replies to VV, PP and II.
+
+    The sum of a line does not include the semicolon.
+    """
     texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
     return tuple(with_sum(text + b";", text) for text in texts)
 
 
 def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
-    """Return the values by key.
+    """Read `KEY:VALUE;` lines with their sums, as in the replies to VV, PP and II.
+
+    Returns:
+        The values by key.
 
     Raises:
         FramingError: a line is invalid.
@@ -383,12 +415,14 @@ def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """The reply to PP, with limits in mm, steps, and turns per minute.
+    """The specification of a URG sensor, as in the reply to PP: range, steps and speed.
+
+    A step is one direction of the beam.
 
     Attributes:
         model: name of the model.
-        nearest_mm: smallest distance (DMIN).
-        farthest_mm: largest distance (DMAX).
+        nearest_mm: smallest distance that the sensor measures (DMIN).
+        farthest_mm: largest distance that the sensor measures (DMAX).
         resolution: number of steps in a whole turn (ARES).
         first: first step that measures (AMIN).
         last: last step that measures (AMAX).
@@ -416,7 +450,7 @@ class Specification:
 
     @classmethod
     def parse(cls, lines: Iterable[bytes]) -> Specification:
-        """Read a reply to PP.
+        """Read the specification of a sensor from the lines of its reply to PP.
 
         Raises:
             WireError: a line is invalid, or a number is missing, invalid or below 0.

@@ -25,12 +25,13 @@ _MID_BIT: Final = _OVERSAMPLING // 2
 
 @dataclass(frozen=True, slots=True)
 class UartSetting:
-    """The setting of a UART.
+    """The setting of a UART: bit rate and format of a character.
 
     Attributes:
         baud: bit rate in bit/s, at least 1.
         data_bits: number of data bits of a character, 5 to 8. The lowest bit is sent first.
-        parity: parity of the bit after the data bits.
+        parity: parity bit after the data bits: "N" (none), "E" (even), "O" (odd), "M" (mark, 1) or
+            "S" (space, 0).
         stop_bits: number of stop bits: 1, 1.5 or 2. A receiver checks only the first stop bit.
 
     Raises:
@@ -76,7 +77,9 @@ class UartSetting:
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
-        """Compute the parity bit of a character; without parity the bit is 1, like the stop bit.
+        """Return the parity bit of a character.
+
+        Without parity the result is 1, like the stop bit.
 
         Args:
             value: the character.
@@ -85,7 +88,7 @@ class UartSetting:
         return {"E": odd, "O": 1 - odd, "S": 0}.get(self.parity, 1)
 
     def bits(self, value: int) -> tuple[int, ...]:
-        """Return start bit, data bits and parity bit of a character.
+        """Return the start bit, the data bits and the parity bit of a character.
 
         Args:
             value: the character. Bits above its data bits are not sent.
@@ -96,14 +99,14 @@ class UartSetting:
         return (0, *data, *parity)
 
     def levels(self, value: int, start_ps: int) -> Iterator[tuple[int, int]]:
-        """Yield the levels of the line while a character is sent.
+        """Yield the levels of the line, 1 or 0, while a character is sent.
 
         Args:
             value: the character.
-            start_ps: time at which the start bit begins.
+            start_ps: time at which the start bit begins, in ps.
 
         Yields:
-            The levels 1 or 0, each with its end in ps. The stop bits are one level.
+            The levels, each with its end in ps. The stop bits are one level.
         """
         for number, bit in enumerate(self.bits(value), start=1):
             yield bit, start_ps + number * PS_PER_S // self.baud
@@ -112,11 +115,11 @@ class UartSetting:
 
 @dataclass(frozen=True, slots=True)
 class Character:
-    """A character received by a UART.
+    """A character that a UART has received, with its errors.
 
     Attributes:
         value: sampled data bits.
-        end_ps: end of the first stop bit.
+        end_ps: end of the first stop bit, in ps.
         framing_error: whether the line was 0 in place of a stop bit.
         parity_error: whether the parity bit does not match the value.
         line_break: whether the line was 0 from the start bit to the stop bit. `framing_error` is
@@ -159,21 +162,24 @@ class UartReceiver:
 
     @property
     def due_ps(self) -> int:
-        """The time at which the stop bit is sampled, or `NEVER` without a present character."""
+        """Time at which the UART samples the stop bit of the character that it receives, in ps.
+
+        It is `NEVER` if no character is being received.
+        """
         if self._sampled is None:
             return NEVER
         left = self._frame_samples - len(self._sampled) - 1
         return self._time_of(self._next + left * _OVERSAMPLING)
 
     def push(self, level: int, until_ps: int) -> Iterator[Character]:
-        """Set the level of the line, starting at the end of the previous push.
+        """Receive a level of the line, which begins at the end of the previous level.
 
         Args:
             level: level of the line, 1 or 0.
             until_ps: end of the level. A time in the past is allowed.
 
         Yields:
-            The characters that are complete.
+            The characters that are completed by this level.
         """
         end = self._sample_from(until_ps)
         while self._next < end:
@@ -233,13 +239,15 @@ class UartReceiver:
 def sample(
     data: bytes, sender: UartSetting, receiver: UartSetting, start_ps: int = 0
 ) -> tuple[Character, ...]:
-    """Receive with one UART setting the bytes that another setting sends back to back.
+    """Return what a UART receives if the sender has another setting, such as another bit rate.
+
+    The bytes are sent back to back.
 
     Args:
         data: the sent bytes.
         sender: the setting of the sender.
         receiver: the setting of the receiver.
-        start_ps: start of the first start bit.
+        start_ps: start of the first start bit, in ps.
 
     Returns:
         The received characters. Reception ends when the line has been idle for a character.

@@ -30,7 +30,7 @@ _LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
 
 
 class LineType(Enum):
-    """Kind of a line.
+    """Kind of a line that a ucode reader sends.
 
     Attributes:
         READER: line after power-up and in answer to ID, with the version of the protocol, the range
@@ -65,7 +65,10 @@ _COMMANDS: Final = (b"ID", b"ON", b"OFF")
 
 
 def parse_ucode(text: str) -> str:
-    """Return a ucode of 128 bits in normal form, which has 32 hex digits in capitals.
+    """Return a ucode of 128 bits in its normal form, 32 hex digits in capitals.
+
+    Args:
+        text: the ucode with hex digits in upper or lower case.
 
     Raises:
         FieldError: the text is not a ucode.
@@ -81,11 +84,12 @@ def parse_ucode(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class UcodeLine:
-    """A line of a reader.
+    """A line that a ucode reader sends.
 
     Attributes:
         type: kind of the line.
-        fields: values, as in `HIGHEST`. Ucodes are texts of 32 hex digits in capitals.
+        fields: values of the line, whose limits are in `HIGHEST`. Ucodes are texts of 32 hex digits
+            in capitals.
 
     Raises:
         FieldError: the fields do not fit the kind.
@@ -112,10 +116,10 @@ class UcodeLine:
 
 
 def parse_line(line: bytes) -> UcodeLine:
-    """Read a line without its end.
+    """Parse a line of a ucode reader, without its line end.
 
     Raises:
-        FramingError: the line is not a line of a reader.
+        FramingError: the line does not have the form of a reader's line.
         ChecksumError: the sum is wrong.
         FieldError: the fields do not fit the kind.
     """

@@ -429,8 +429,7 @@ class Readings(ServoSettings):
 
     @property
     def spare_mv(self) -> int:
-        """Voltage left for driving current: largest voltage of the power stage minus the back-EMF, in
-        mV.
+        """Voltage left for driving current, in mV: largest voltage of the stage minus the back-EMF.
 
         It is below 0 if an external load turns the motor faster than the supply can.
         """

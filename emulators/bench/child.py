@@ -19,13 +19,13 @@ once."""
 
 @dataclass(frozen=True, slots=True)
 class Child:
-    """A running emulator.
+    """An emulator that runs in a process of its own, with the paths of its files.
 
     Attributes:
         process: the process.
         link: terminal that the emulator serves, if any.
         control: control socket of the emulator.
-        log: output of the emulator up to now.
+        log: file with the output of the emulator up to now.
     """
 
     process: subprocess.Popen[bytes]
@@ -48,11 +48,11 @@ class _ChildError(RuntimeError):
 
 @contextmanager
 def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
-    """Run the emulator whose command is `main` of a module; end the emulator on exit.
+    """Run an emulator in a process of its own, and end it when the context is left.
 
     Args:
-        module: the module with the command.
-        options: options of the command, except `--control`.
+        module: module whose function `main` is the command of the emulator.
+        options: options of the command, except `--link` and `--control`.
         linked: whether the command has an option `--link` for a terminal.
 
     Raises:

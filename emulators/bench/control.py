@@ -61,11 +61,11 @@ class _Controlled(Protocol):
 
 
 class EmulatorControl(RequestDispatcher):
-    """Answers requests about one emulator.
+    """Executes the requests of a control socket at one emulator, such as "set" or "fault".
 
     Args:
         emulator: the controlled emulator. No other code may step it while a request is answered.
-            Only a `RunningEmulator` has lines to show.
+            Only a `RunningEmulator` can show the lines on its wire.
     """
 
     def __init__(self, emulator: _Controlled) -> None:
@@ -203,7 +203,7 @@ class EmulatorEnded(Exception):  # noqa: N818 - no error
 
 
 class RequestInbox:
-    """Accepts requests from any thread; the emulator's own thread answers them.
+    """Queue for control requests from any thread, which the emulator's own thread answers.
 
     Args:
         control: object that answers the requests in the same way as requests of the control socket.
@@ -215,10 +215,12 @@ class RequestInbox:
         self._closed = False
 
     def post(self, requests: Sequence[Object]) -> Future[list[Object]]:
-        """Submit requests. The emulator answers them together, between two steps.
+        """Submit requests from any thread. The emulator answers them together, between two steps.
 
-        The future raises EmulatorEnded if the emulator ends before it answers. The future is not
-        cancelled in this case, because an event loop would then end the task that waits for it.
+        Returns:
+            A future with the answers. It raises EmulatorEnded if the emulator ends before it
+            answers. The future is not cancelled in this case, because an event loop would then end
+            the task that waits for it.
         """
         from concurrent.futures import Future  # noqa: PLC0415 - slow
 

@@ -25,7 +25,7 @@ _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.AS
 
 @dataclass(frozen=True, slots=True)
 class FaultSpec:
-    """A fault with its arguments and times.
+    """Specification of a fault that an operator starts: its name, its arguments and its times.
 
     Attributes:
         name: name of a fault of the wire, or of a physical fault of the device.
@@ -61,11 +61,11 @@ def _any_name(name: str) -> None:
 def parse_fault_spec(
     text: str, check_name: Callable[[str], object] = _any_name, now_us: int = 0
 ) -> FaultSpec:
-    """Read the text of a fault.
+    """Parse the text with which a user specifies a fault, such as `flip=0.001@5s-7s`.
 
     Args:
-        text: text of a fault, such as `flip=0.001@5s-7s`, or `cut@+100ms-+2s` with times that count
-            from `now_us`.
+        text: name, arguments and times of the fault. Times with a plus sign, as in
+            `cut@+100ms-+2s`, count from `now_us`.
         check_name: function that is called with the name before the times are read. It raises
             ValueError for an unknown fault.
         now_us: present time.
@@ -117,7 +117,7 @@ def _is_named(name: str, check_name: Callable[[str], object]) -> bool:
 
 @dataclass(slots=True)
 class FaultOrder:
-    """A fault scheduled for a time or for a condition.
+    """A fault that has been scheduled for a time, or for the moment when a condition becomes true.
 
     Attributes:
         spec: the fault with its full name.
@@ -136,7 +136,14 @@ class FaultOrder:
     to_us: int = NEVER
 
     def begin(self, now_us: int) -> FaultSpec:
-        """Store start and end of a fault whose wait is over; return the fault with its end."""
+        """Start the fault, because its time has come or its condition is true.
+
+        Args:
+            now_us: present time.
+
+        Returns:
+            The specification of the fault with its end.
+        """
         self.due_us = max(now_us, self.spec.from_us)
         self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
         return replace(self.spec, to_us=self.to_us)
@@ -151,7 +158,10 @@ _PHYSICAL: Final = FaultForm("", rated=False)
 
 
 class WireFaults(Protocol):
-    """An object on which wire faults are armed by name: `FaultyPort`, or a whole bus."""
+    """Interface of an object at which faults are switched on by name ("armed").
+
+    The object is a whole bus, or the `FaultyPort` of a line.
+    """
 
     @property
     def fault_types(self) -> Mapping[str, FaultForm]:
@@ -181,7 +191,7 @@ class WireFaults(Protocol):
 
 
 class AssemblyFaults(Copyable):
-    """The faults of several wires, and of the CANopen nodes on them.
+    """The faults of a rig with several wires, and with CANopen nodes on them, under unique names.
 
     A fault of a wire has the name `WIRE/fault`, or its plain name if there is only one wire. A
     fault of a node has the name `NODE/fault`. If there is only one device, its faults have their
@@ -210,14 +220,29 @@ class AssemblyFaults(Copyable):
         return tuple(self._wires)
 
     def of_wire(self, wire: str) -> dict[str, str]:
-        """Return the full names of a wire's faults, by the names that they have on the wire."""
+        """Return the names that the faults of a wire have in this rig.
+
+        Args:
+            wire: name of the wire.
+
+        Returns:
+            The names in this rig, by the names on the wire.
+        """
         bare = self._bare is not None
         return {
             fault: fault if bare else f"{wire}/{fault}" for fault in self._wires[wire].fault_types
         }
 
     def of_node(self, node: str) -> dict[str, str]:
-        """Return the full names of a node's faults, by the names that they have on the node."""
+        """Return the names that the faults of a node have in this rig.
+
+        Args:
+            node: name of the node.
+
+        Returns:
+            The names in this rig, by the names at the node. The result is empty for an unknown
+            node.
+        """
         held = self._nodes.get(node)
         if held is None:
             return {}
@@ -263,7 +288,17 @@ class AssemblyFaults(Copyable):
         holder.clear(fault)
 
     def find(self, name: str) -> tuple[WireFaults, str]:
-        """Return the owner of a fault and the fault's name at the owner; KeyError if unknown."""
+        """Find the wire or the node that a fault belongs to.
+
+        Args:
+            name: name of the fault in this rig.
+
+        Returns:
+            The faults of the wire or the node, and the name that the fault has there.
+
+        Raises:
+            KeyError: no fault has this name.
+        """
         owner, slash, fault = name.rpartition("/")
         holders = [self._bare, self._alone]
         if slash:
@@ -305,7 +340,7 @@ def _at(action: Callable[[], None], now_us: int) -> None:
 
 
 class Assembly(Copyable):
-    """The physical inputs and outputs of several devices, as of one device.
+    """The physical inputs and outputs of several devices in one object, under unique names.
 
     If there is only one device, its signals have their plain names. With several devices a signal
     has the name of its device as prefix: `left_drive/shaft_load_nm`.
@@ -350,7 +385,14 @@ class Assembly(Copyable):
         return name if part == self._plain else f"{part}/{name}"
 
     def find(self, name: str) -> tuple[HasSignals | None, str]:
-        """Return the device that a name belongs to (or None), and the rest of the name."""
+        """Find the device that a signal belongs to.
+
+        Args:
+            name: name of the signal, with or without the prefix of its device.
+
+        Returns:
+            The device, or None if there is none; and the name without the prefix.
+        """
         prefix, slash, rest = name.partition("/")
         if slash and (part := self.parts.get(prefix)):
             return part, rest
@@ -396,7 +438,11 @@ class _AssemblyInputs(Copyable):
         return part.inputs[rest]
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; raise ValueError if it is unknown or does not accept the value."""
+        """Set a physical input of one of the devices.
+
+        Raises:
+            ValueError: the input is unknown, or does not accept the value.
+        """
         part, rest = self._find(name)
         part.inputs.set(rest, value)
 
@@ -414,7 +460,11 @@ class _AssemblyInputs(Copyable):
         )
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if no input has the name and type."""
+        """Return the description of a physical input of one of the devices.
+
+        Raises:
+            ValueError: no input has the name and the type.
+        """
         part, rest = self._assembly.find(name)
         if part is not None:
             return part.inputs.find(rest, signal_type)
@@ -477,7 +527,7 @@ class _FaultRow(NamedTuple):
 
 
 class Operator(Copyable):
-    """Sets inputs, presses buttons, and starts and clears faults.
+    """Acts on an emulated device as a person would: sets inputs, presses buttons, starts faults.
 
     An action between two ticks takes effect in the next tick, at `now_us` at the earliest. Each
     press lasts for at least one tick.
@@ -485,9 +535,9 @@ class Operator(Copyable):
     Args:
         inputs: the physical inputs of the device.
         tick_us: the device's control period.
-        event_queue: queue for releases and scheduled faults.
-        wire: the port on which wire faults are armed.
-        note: function that is called with each change, such as `power_button=1`.
+        event_queue: queue for releases of buttons and for scheduled faults.
+        wire: the port at which faults of the wire are switched on.
+        note: function that is called with a text for each change, such as `power_button=1`.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
@@ -514,7 +564,7 @@ class Operator(Copyable):
         """Start and end of the scheduled faults, by name of the fault."""
 
     def set(self, name: str, *values: Setting) -> None:
-        """Set an input, or all inputs of a group.
+        """Set a physical input of the device, or all inputs of a group.
 
         Raises:
             ValueError: the input or group is unknown, the number of values is wrong, or a value is
@@ -540,7 +590,16 @@ class Operator(Copyable):
         return pairs
 
     def press(self, now_us: int, name: str, duration_us: int = PRESS_US) -> None:
-        """Press a button, and release it after `duration_us`; ValueError if it is not a button."""
+        """Press a button of the device, and release it after a time.
+
+        Args:
+            now_us: present time.
+            name: name of the button.
+            duration_us: time after which the button is released.
+
+        Raises:
+            ValueError: the name is not that of a button.
+        """
         self.check_press(name, duration_us)
         self._put(name, 1)
         tick_us = self._tick_us_of(name)
@@ -567,9 +626,17 @@ class Operator(Copyable):
         self.set(name, 0)
 
     def fault(self, now_us: int, spec: FaultSpec) -> None:
-        """Start a fault, now or at its time; raise ValueError if that is impossible.
+        """Start a fault, now or at its time.
 
         The fault replaces faults of the same name at overlapping times.
+
+        Args:
+            now_us: present time.
+            spec: name, arguments and times of the fault.
+
+        Raises:
+            ValueError: the fault is unknown, does not accept the arguments, or would have ended
+                already.
         """
         spec = replace(spec, name=self.full_name_of(spec.name))
         self.check_fault(spec)
@@ -596,7 +663,11 @@ class Operator(Copyable):
             bind_arguments(spec.name, _PHYSICAL, spec.arguments)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, or cancel a scheduled fault; raise ValueError if the name is unknown."""
+        """End a fault, or cancel it if it is scheduled.
+
+        Raises:
+            ValueError: no fault has this name.
+        """
         self.check_clear(name)
         name = self.full_name_of(name)
         self._drop_fault(name)
@@ -610,7 +681,10 @@ class Operator(Copyable):
             )
 
     def full_name_of(self, name: str) -> str:
-        """Return the full name of a fault; the name of a single node may be omitted."""
+        """Return the name under which a fault is known here.
+
+        The prefix of a node is dropped if it is not needed, because the node is the only one.
+        """
         bare = name.rpartition("/")[2]
         more = bare != name and name in self._wire.fault_types and name not in self.faults
         return bare if more else name

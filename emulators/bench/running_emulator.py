@@ -28,9 +28,10 @@ _SWITCH_S: Final = 0.0005
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Prepare Python for real time: switch threads more often, and freeze old objects.
+    """Context in which Python keeps real time better: threads switch more often.
 
-    Frozen objects are not collected as garbage, which takes 50 ms.
+    Existing objects are excluded from the garbage collection ("frozen"), because collecting them
+    takes 50 ms.
     """
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)
@@ -48,14 +49,14 @@ fast)."""
 
 
 class RunningEmulator(ABC):
-    """A rig with its operator, event queue and log.
+    """Base class of a running emulator: a rig with its operator, event queue, log and recording.
 
     Args:
         name: name of the device.
-        device: physical side of the device.
-        wire: object on which wire faults are armed.
-        link: address for the host, as text.
-        trace: the recording, closed at the end.
+        device: physical inputs and outputs of the device.
+        wire: object at which faults of the wire are switched on.
+        link: address at which a host reaches the device, as text.
+        trace: recording, which is closed at the end.
 
     Attributes:
         operator: operator that sets inputs, presses buttons and starts faults.
@@ -89,7 +90,11 @@ class RunningEmulator(ABC):
 
     @property
     def effective_us(self) -> int:
-        """The time at which an action takes effect: now within an action, or else the next tick."""
+        """Time at which an action of the operator takes effect.
+
+        It is the time of the next tick, or the present time if an action of the event queue is
+        running.
+        """
         if self.rig.acting_us is not None:
             return self.rig.acting_us
         now_us, tick_us = self.rig.now_us, self.device.tick_us
@@ -125,7 +130,7 @@ class RunningEmulator(ABC):
 
     @property
     def trace_error(self) -> str:
-        """Reason for the early end of the recording, or "" if there was no error."""
+        """Reason for which the recording ended early, or "" if there was no error."""
         return self._trace.error if self._trace else ""
 
     def stop(self) -> None:
@@ -158,11 +163,11 @@ STATE: Final = "state"
 
 
 class OutputWatch:
-    """Writes outputs when they have changed: `TIME * NAME VALUE`.
+    """Prints physical outputs whenever they change, as lines `TIME * NAME VALUE`.
 
     Args:
         device: the device with the outputs.
-        write: function that receives the lines.
+        write: function that is called with each line.
         names: names of the outputs that are watched from the start.
     """
 
@@ -186,12 +191,14 @@ class OutputWatch:
 
 
 class Transcript:
-    """Writes lines of the wire as the host sees them, actions of the operator, and watched outputs.
+    """Prints what happens in an emulator: lines on the wire, actions of the operator, outputs.
+
+    The lines of the wire appear as the host sees them.
 
     Args:
         emulator: the emulator to watch.
-        write: function that receives the lines.
-        wanted: function that selects lines of the wire.
+        write: function that is called with each line.
+        wanted: function that decides which lines of the wire are printed.
     """
 
     def __init__(
@@ -218,7 +225,15 @@ class Transcript:
         self._watch(now_us)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send data as the host, and show the data at once, even if the line is incomplete."""
+        """Send data to the device as the host, and print the data at once.
+
+        They are printed even if the line is incomplete.
+
+        Args:
+            now_us: present time.
+            data: bytes to send.
+            shown: bytes to print.
+        """
         self.write(now_us, Mark.TO_DEVICE, escape(shown))
         self._sending = True
         self._emulator.send(now_us, data)

@@ -20,10 +20,11 @@ _FIRST_NUMBER: Final = -1
 
 
 def priority(frame: CanFrame) -> int:
-    """Return the arbitration field as a number; the frame with the smallest number wins.
+    """Return the arbitration field of a frame as a number, for comparison with other frames.
 
-    Dominant bits are 0 in the number. With equal identifiers a data frame wins over a remote
-    frame, and an 11-bit identifier over a 29-bit identifier (ISO 11898-1, arbitration).
+    The frame with the smallest number wins, because dominant bits are 0. With equal identifiers a
+    data frame wins over a remote frame, and an 11-bit identifier over a 29-bit identifier (ISO
+    11898-1, arbitration).
 
     >>> frames = [CanFrame.parse(t) for t in ("101#", "100#", "100#R", "04000000#", "04000000#R")]
     >>> [str(frame) for frame in sorted(frames, key=priority)]
@@ -41,7 +42,7 @@ def dominant(frames: Sequence[CanFrame]) -> CanFrame:
 
 
 class CanArbiter(ArbiterFields):
-    """The first frames of all queues, sorted in the order of the arbitration on the bus.
+    """Decides which nodes of an emulated CAN bus send next, by the identifiers of their frames.
 
     All times are in the units of the segment.
 
@@ -49,7 +50,7 @@ class CanArbiter(ArbiterFields):
         heads: a heap of whole numbers, which are sorted faster than tuples. The high bits are the
             priority of the first frame of a queue, and the low bits are the number of the node.
         free: earliest time at which a frame can start.
-        slow: whether some node has to wait longer than the bus is busy.
+        slow: whether a node has to wait longer than until the bus is free.
     """
 
     __slots__ = ()
@@ -83,7 +84,10 @@ class CanArbiter(ArbiterFields):
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:
-        """Remove and return the nodes that win: one node, or all with the same identifier."""
+        """Remove the nodes that win the arbitration, and return them.
+
+        There is one winner, or several if their frames have the same identifier.
+        """
         heads = self.heads
         head = heappop(heads)
         winners = [self._ends[head & _NUMBER_MASK]]
@@ -92,7 +96,15 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Return the start of the next frame, and the winners among the nodes ready by then."""
+        """Choose the nodes that send next if some nodes may not send yet, and remove them.
+
+        Args:
+            everybody: whether to choose all nodes that may send at the start, not only those that
+                win the arbitration. This happens on a bus with a short circuit.
+
+        Returns:
+            The start of the next frame, and the nodes.
+        """
         waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]

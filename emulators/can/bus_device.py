@@ -12,16 +12,20 @@ Accepted = frozenset[int] | None
 
 
 class Filtering(Protocol):
-    """A device that declares the CAN-IDs it accepts.
+    """Interface of a device that declares which CAN-IDs it receives, as for an acceptance filter.
 
-    A filter may pass more frames than the device needs, but never fewer. The device itself checks
-    each frame that passes. After a frame that may change the accepted CAN-IDs, the filter passes
-    all frames until the device has handled that frame.
+    The emulated bus delivers only these frames, which saves time. A filter may let more frames pass
+    than the device needs, but never fewer, because the device itself checks each frame. After a
+    frame that may change the CAN-IDs, the filter lets all frames pass until the device has handled
+    that frame.
     """
 
     @property
     def accepts(self) -> Accepted:
-        """The accepted CAN-IDs. None means all: from power-on or a reset to the first tick."""
+        """The CAN-IDs that the device receives now, or None for all CAN-IDs.
+
+        They are None from power-on or a reset to the first tick.
+        """
         ...
 
     @property

@@ -89,6 +89,9 @@ class CanEmulator(RunningEmulator):
 
     @property
     def lost(self) -> dict[str, int]:
-        """Frames lost because of a full queue, at an end of the bus or outside."""
+        """Number of frames that were lost because a queue was full.
+
+        The queue is at an end of the emulated bus, or at the port to a real bus.
+        """
         ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
         return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}

@@ -108,7 +108,15 @@ class CanEnd(EndFields):
         return self._first + tuple([frame for _, frame in self._more or ()])
 
     def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
-        """Connect a device: use its filter, report error states, wake it when a frame arrives."""
+        """Connect a device to this end of the bus.
+
+        The end then uses the filter of the device, reports error states to it, and calls `wake`
+        when a frame arrives.
+
+        Args:
+            device: the device.
+            wake: function that is called with the time at which a frame arrives.
+        """
         self.wake = wake
         if bus_device.is_filtering(device):
             self._device = device
@@ -133,7 +141,7 @@ class CanEnd(EndFields):
         return frames
 
     def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
-        """Return the frames that ended by `now_us`, each with the time at which it ended."""
+        """Return the frames that have arrived by `now_us`, each with the time at which it ended."""
         if self.segment.now_us < now_us:
             self.wire.advance(now_us)
         if not self._first and not self.unfiltered:  # mostly: a fifth of what a host's wait costs
@@ -176,7 +184,13 @@ class CanEnd(EndFields):
 
     @in_kernel
     def receive(self, at_us: int, frame: CanFrame, alone: Frames) -> None:
-        """Receive a frame from the bus; all receivers share `alone`, a tuple with the frame."""
+        """Receive a frame from the bus, and wake the device.
+
+        Args:
+            at_us: time at which the frame ended.
+            frame: the frame.
+            alone: tuple with only this frame, which all receivers share to save time.
+        """
         if not self._first:  # one of all ends' objects is touched, not six: 5 % of eight buses
             self._first, self.arrived_us = alone, at_us
             self.wake(at_us)
@@ -233,7 +247,7 @@ class CanEnd(EndFields):
 
 
 class Babbler(CanEnd):
-    """A node that always has a frame to send and ignores its error state.
+    """A faulty node ("babbling idiot") that sends all the time and ignores its error state.
 
     This class is in this module because a class of a compiled module cannot derive from a class
     with the fields of the kernel.

@@ -95,7 +95,9 @@ class ErrorCounters(Part):
 
 
 class FaultConfinement(Part):
-    """Counts successes and errors of all nodes. Good frames on an intact bus need no counting.
+    """Updates the error counters and error states of all nodes of a bus.
+
+    Good frames need no counting while all counters are 0.
 
     Args:
         ends: all ends of the bus.
@@ -134,7 +136,15 @@ class FaultConfinement(Part):
             self.count(at_us, end, ErrorCounters.not_acknowledged)
 
     def count(self, at_us: int, end: CanEnd, event: Callable[[ErrorCounters], None]) -> None:
-        """Apply a change to the counters of one node, and report a change of state."""
+        """Update the error counters of one node, and report its error state if it has changed.
+
+        A node in bus-off counts nothing until it is restarted.
+
+        Args:
+            at_us: time of the event.
+            end: end of the node.
+            event: method of `ErrorCounters` that counts the event.
+        """
         controller = end.controller
         state = controller.state
         if state is ErrorState.BUS_OFF and event is not ErrorCounters.restart:
@@ -162,7 +172,7 @@ _SEQUENCE_BITS: Final = 11
 
 
 class Recovery(Part):
-    """Counts the recessive sequences for each node that waits to return from bus-off.
+    """Recovery from bus-off: counts the recessive sequences for each node that waits.
 
     Args:
         bit: length of a bit. All times in this class are in the same unit.
@@ -177,7 +187,10 @@ class Recovery(Part):
         self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
-        """Start the wait of a node for its return; a second call has no effect."""
+        """Let a node in bus-off wait for its return.
+
+        If the node waits already, nothing happens.
+        """
         self._waiting.setdefault(end.number, (end, _SEQUENCES, now))
         self.active = True
 
@@ -195,7 +208,14 @@ class Recovery(Part):
         )
 
     def interrupt(self, at: int, until: int) -> None:
-        """Count the sequences before a dominant bit `at`; the bus is recessive again at `until`."""
+        """Account for a frame on the bus: count the recessive sequences before it.
+
+        The count continues after the frame, when the bus is recessive again.
+
+        Args:
+            at: time of the first dominant bit.
+            until: time from which the bus is recessive again.
+        """
         for number, (end, left, since) in self._waiting.items():
             seen = max(0, at - since) // self._sequence
             self._waiting[number] = (end, left - seen, max(since, until))

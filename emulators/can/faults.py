@@ -122,7 +122,7 @@ class CanFaults(Copyable):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str, number: int | None = None) -> None:
-        """Arm a fault at the present time of the bus; it replaces an armed fault of the same name.
+        """Switch a fault on at the present time of the bus. It replaces a fault of the same name.
 
         Args:
             name: name of the fault.
@@ -156,7 +156,16 @@ class CanFaults(Copyable):
         return self._tallies[key].acted if key in self._tallies else 0
 
     def judge(self, senders: Sequence[int]) -> FaultVerdict:
-        """Return the effect of the faults on the senders' next frame; it is fixed until `spend`."""
+        """Decide which fault, if any, hits the next frame on the bus.
+
+        The decision for this frame stays the same until `spend` is called.
+
+        Args:
+            senders: numbers of the ends that send the frame.
+
+        Returns:
+            What happens to the frame.
+        """
         if self._planned is None:
             self.place = self.chance("place").draw()
         self._planned, self._hitting = senders, None
@@ -191,7 +200,10 @@ class CanFaults(Copyable):
         return 0
 
     def chance(self, stream: str) -> Chance:
-        """Return the random generator of a name; its numbers are the same in every run."""
+        """Return the random generator of a fault, which is made at the first call.
+
+        Each name has an independent stream of numbers, which is the same in every run.
+        """
         return self._chances.setdefault(stream, Chance(self.seed, stream))
 
     @property

@@ -217,7 +217,14 @@ class CanSegment(TransmissionOutcomes):
         self._recount(now_us)
 
     def force_off(self, end: CanEnd, now_us: int) -> None:
-        """Force a node bus-off, as after 32 errors in a row; its frame on the bus is aborted."""
+        """Force a node into bus-off, as after 32 errors in a row.
+
+        If the node is sending a frame, the frame is aborted.
+
+        Args:
+            end: end of the node.
+            now_us: present time.
+        """
         self.disturb(now_us)
         if end in self._winners:
             self._withdraw()
@@ -236,7 +243,10 @@ class CanSegment(TransmissionOutcomes):
             self._recovery.begin(end, quiet)
 
     def disturb(self, now_us: int) -> None:
-        """Plan the next transmission again after a change, if it has not started at `now_us`."""
+        """Plan the next transmission again, because nodes or faults of the bus have changed.
+
+        A transmission that has started before `now_us` is not changed.
+        """
         self.advance(now_us)
         if self._start >= now_us * self.unit:
             self._withdraw()

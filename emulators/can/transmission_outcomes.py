@@ -25,9 +25,10 @@ KEPT_SPANS: Final = 32_768
 
 
 class BusyTime(BusyFields):
-    """The latest busy times of a bus; consecutive frames are one span.
+    """Records when a bus was busy, to compute its load.
 
-    Times are whole numbers of any unit.
+    Consecutive frames are one span. Only the latest spans are kept. Times are whole numbers of any
+    unit.
     """
 
     __slots__ = ()
@@ -44,11 +45,11 @@ class BusyTime(BusyFields):
         self._until = until
 
     def permille(self, first: int, now: int, present: tuple[int, int]) -> int:
-        """Return the share of the time from `first` to `now`, in 0.1 %.
+        """Return the share of a time span in which the bus was busy, in 0.1 %.
 
         Args:
-            first: start of the measured time.
-            now: end of the measured time.
+            first: start of the time span.
+            now: end of the time span.
             present: start and end of the present frame.
         """
         spans = (*self._spans, (self._since, self._until), present)
@@ -111,11 +112,11 @@ _SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 
 
 class TransmissionOutcomes(SegmentFields):
-    """Outcomes of a transmission on the bus, applied to all nodes.
+    """The possible outcomes of a transmission on an emulated bus, each as a method.
 
-    A bit and a microsecond are whole multiples of the unit of all times. Only time stamps are
-    rounded, up to the next microsecond. `CanSegment` plans the transmission and chooses the method
-    for its outcome.
+    The methods deliver frames, and update queues and error counters of the nodes. `CanSegment`
+    plans the transmission and chooses the method for its outcome. A bit and a microsecond are whole
+    multiples of the unit of all times. Only time stamps are rounded, up to the next microsecond.
 
     Attributes:
         unit: number of units in a microsecond.

@@ -70,14 +70,14 @@ class CanWire(Copyable):
         self._babbler: CanEnd | None = None
 
     def end(self, accepts: Accepted = None) -> CanEnd:
-        """Connect another node.
+        """Connect another node to the bus.
 
         Args:
             accepts: CAN-IDs that the node receives, or None for all. A 29-bit CAN-ID has bit 29
                 set.
 
         Returns:
-            The end of the node, which is its port in a `Station`.
+            The end of the bus for this node, which is its port in a `Station`.
         """
         end = CanEnd(self, self._count, accepts)
         self._count += 1
@@ -97,7 +97,7 @@ class CanWire(Copyable):
         return min(self.bus.due_us, *(apart.due_us for apart in self._apart.values()))
 
     def advance(self, now_us: int) -> None:
-        """Advance the bus to a time.
+        """Advance the bus to a time, and deliver the frames that end by then.
 
         Args:
             now_us: time to which the bus advances, in microseconds.
@@ -108,7 +108,7 @@ class CanWire(Copyable):
                 apart.advance(now_us)
 
     def advance_until_received(self, until_us: int) -> bool:
-        """Advance to the first frame that a station has received.
+        """Advance the bus until a station has received a frame, at most to a given time.
 
         Args:
             until_us: latest time.
@@ -123,13 +123,13 @@ class CanWire(Copyable):
         return due_us <= until_us
 
     def load_permille(self, window_us: int = WINDOW_US) -> int:
-        """Measure how busy the bus was.
+        """Return the load of the bus: the share of the latest time in which it was busy.
 
         Args:
             window_us: length of the time before now that is measured, at most a second.
 
         Returns:
-            The share of busy time, in 0.1 %.
+            The load in 0.1 %.
         """
         bus = self.bus
         now = bus.now_us * bus.unit
@@ -137,7 +137,7 @@ class CanWire(Copyable):
         return bus.busy.permille(first, now, bus.present)
 
     def disconnect(self, end: CanEnd) -> None:
-        """Unplug a node: it is alone, and its frames are not acknowledged.
+        """Unplug a node from the bus. Its frames are then neither received nor acknowledged.
 
         Args:
             end: the node's end.
@@ -164,7 +164,7 @@ class CanWire(Copyable):
             self.bus.whole = not self._apart
 
     def cut_power(self, end: CanEnd) -> None:
-        """Cut the power of a node: its frames are lost, and its controller is reset.
+        """Cut the power of a node: its waiting frames are lost, and its CAN controller is reset.
 
         Args:
             end: the node's end.
@@ -187,7 +187,9 @@ class CanWire(Copyable):
         end.segment.force_off(end, self.bus.now_us)
 
     def release(self, end: CanEnd) -> None:
-        """Let a node that was forced off recover, as with most drivers.
+        """Let a node recover that `force_off` has put into bus-off.
+
+        From then on it recovers automatically, as with most drivers.
 
         Args:
             end: the node's end.

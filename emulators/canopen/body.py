@@ -107,12 +107,12 @@ SHAFTS: Final = (
 
 
 class DrivenWheel(NamedTuple):
-    """A wheel on the shaft of a drive.
+    """A wheel of a body, on the shaft of a CANopen drive.
 
     Attributes:
         name: name of the wheel.
         node: node of the drive.
-        forward: sign of the shaft: -1 if the wheel is mounted the other way round, or else 1.
+        forward: sign of the shaft: -1 if the drive is mounted the other way round, or else 1.
     """
 
     name: str
@@ -121,7 +121,9 @@ class DrivenWheel(NamedTuple):
 
 
 class BodyOnDrives:
-    """Moves a body by the shafts of its drives, and applies the load of the body to the shafts.
+    """A robot body on wheels that CANopen drives turn, as part of a rig.
+
+    The shafts of the drives move the body, and the mass and friction of the body load the shafts.
 
     Args:
         body: the body.
@@ -153,7 +155,10 @@ class BodyOnDrives:
 
     @property
     def due_us(self) -> int:
-        """Time of the next action: each tick while the body moves, or `NEVER` while it rests."""
+        """Time of the next call of `act`.
+
+        It is the next tick while the body moves, or `NEVER` while the body rests.
+        """
         return NEVER if self.body.resting else 0
 
     def act(self, now_us: int, /) -> None:
@@ -216,13 +221,13 @@ def _set(bank: QuantityBank, name: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyPlan:
-    """A body on drives, as described in a rig file.
+    """The description of a robot body on CANopen drives in a rig file.
 
     Attributes:
         kind: kind of the body, which is a name of `wheeled_body.SIDES`.
-        drives: device names by wheel.
+        drives: names of the devices that turn the wheels, by wheel.
         mirrored: wheels whose drive is mounted the other way round.
-        parameters: the given arguments of `BodyParameters`.
+        parameters: arguments of `BodyParameters` that the file gives.
     """
 
     kind: str

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A node with the description of its device.
+    """A node to be emulated: its name, its node-ID and the description of its device.
 
     Attributes:
         name: prefix of the signals of the node, and key of its memory in a store file.
@@ -54,12 +54,15 @@ class Described:
 
 
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
-    """Read the files; raise ValueError if a file is unusable, or a node-ID is missing or duplicate.
+    """Read the files and models of the nodes of a command line.
 
     Args:
         specs: the nodes.
         profile: profile for nodes of files without a profile, which is a name of
             `choices.PROFILES`.
+
+    Raises:
+        ValueError: a file is unusable, or a node-ID is missing or duplicate.
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
@@ -105,13 +108,16 @@ def make_nodes(
 
 
 def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> DeviceDescription:
-    """Describe the node of a file, a model or a user's class; raise ValueError for anything else.
+    """Return the description of a device from its file, model or class.
 
     Args:
         cache: cache of EDS files.
         device: EDS or DCF of the node, name of a model, `FILE.yml:NODE` of a bus.yml, or
             `FILE.py:Class` of a DeviceRTC.
         profile: profile for an EDS or DCF, which is a name of `choices.PROFILES`.
+
+    Raises:
+        ValueError: there is no such device, or its file is unusable.
     """
     if isinstance(device, str):
         return _bus_node(cache, device) if is_bus_node(device) else describe_device(device)
@@ -119,7 +125,7 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
 
 
 def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
-    """Read a bus.yml.
+    """Read a bus.yml, the file of ROS 2 that describes the nodes of a CANopen bus.
 
     Args:
         file: path of the bus.yml.
@@ -177,7 +183,10 @@ _NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
 
 
 def describe_rtc(spec: str) -> DeviceDescription:
-    """Describe the component of `FILE.py:Class`.
+    """Return the description of the device on which the component `FILE.py:Class` runs.
+
+    Args:
+        spec: path of the Python file and name of the class.
 
     Raises:
         ValueError: the file cannot be run, or the component is not a valid DeviceRTC.
@@ -234,9 +243,10 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
 
 
 def store_keeper(store: StoreFile) -> Callable[[int], None]:
-    """Return a function that writes the file whenever a node has stored something.
+    """Return a function that writes the store file if a node has stored something.
 
-    If writing fails, the function logs one warning and retries later.
+    The emulator calls the function regularly with the time. If writing fails, the function logs one
+    warning and retries at later calls.
     """
     failed = False
 

@@ -167,7 +167,7 @@ def _predefined(index: int, sub: int) -> tuple[int, bool] | None:
 
 
 def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
-    """Read an EDS or DCF file (CiA 306).
+    """Read an EDS or DCF file (CiA 306), and return the device that it describes.
 
     Args:
         path: path of the file, with any name.
@@ -185,7 +185,7 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
 
 
 def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
-    """Describe the device of an EDS or DCF.
+    """Return the device that an EDS or DCF describes, with a value for each missing default.
 
     A deviation from the standard with a clear meaning is a warning of the description. If a default
     is missing:
@@ -227,7 +227,9 @@ def _describe(file: EdsFile, device: EdsDevice) -> DeviceDescription:
 def in_profile(
     description: DeviceDescription, profile: str, defaults: Mapping[tuple[int, int], int] = _OPEN
 ) -> DeviceDescription:
-    """Return a device with its profile, which supplies defaults missing in the file.
+    """Apply a device profile to the description of a device from an EDS.
+
+    The profile supplies the application, and the defaults that are missing in the file.
 
     Args:
         description: description of the device by its file alone, from `EdsCache.read`.
@@ -271,9 +273,11 @@ def _in_profile(
 
 
 def fitting(row: EntryDescription, value: int) -> Value:
-    """Return the allowed value of an entry that is nearest to a number.
+    """Return the value nearest to a number that the limits of an entry allow.
 
-    For an unsigned entry -1 means all bits set.
+    Args:
+        row: description of the entry.
+        value: the number. For an unsigned entry -1 means all bits set.
     """
     low, high = row.low, row.high
     nearest: int | float = value
@@ -345,10 +349,11 @@ Version = tuple[int, int]
 
 
 class EdsCache:
-    """Reads each EDS or DCF once, and again when the file has changed.
+    """Cache of EDS and DCF files: reads each file once, and again when it has changed.
 
     Attributes:
-        others: other cached results by source, with the versions of their files.
+        others: other cached results, by their source, each with the versions of the files that it
+            depends on.
     """
 
     def __init__(self) -> None:
@@ -356,7 +361,11 @@ class EdsCache:
         self.others: dict[object, tuple[Mapping[Path, Version], object]] = {}
 
     def read(self, path: Path, profile: str | None = AUTO) -> DeviceDescription:
-        """Return the description of a file, see `read_eds`; with profile None, of the file alone.
+        """Return the description of the device in an EDS or DCF file, as `read_eds` does.
+
+        Args:
+            path: path of the file.
+            profile: profile for missing defaults, or None to describe the device by its file alone.
 
         Raises:
             OSError: the file cannot be read.
@@ -372,6 +381,10 @@ class EdsCache:
 
 
 def version_of(path: Path) -> Version:
-    """Return a stamp that changes with the file; raise OSError if the file is not accessible."""
+    """Return the time and size of a file, which change when the file is written.
+
+    Raises:
+        OSError: the file is not accessible.
+    """
     status = path.stat()
     return status.st_mtime_ns, status.st_size

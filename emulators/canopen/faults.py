@@ -541,12 +541,12 @@ NODE_FAULTS: Final[Mapping[str, _NodeFaultType]] = {
 
 
 class NodeFaults(Copyable):
-    """The faults of one node, which an operator arms by name.
+    """The faults of one CANopen node, which an operator switches on ("arms") by name.
 
     Args:
         node: the node.
-        wire: bus of the node, which supplies the random numbers. Its faults are limited to the
-            frames of the node.
+        wire: bus of the node, which supplies the random numbers. Faults of the bus are armed so
+            that they hit only frames of the node.
 
     Attributes:
         station: the station of the node, as soon as the node has one.
@@ -581,7 +581,7 @@ class NodeFaults(Copyable):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; it replaces an armed fault of the same name.
+        """Switch on a fault of the node. It replaces a fault of the same name.
 
         Raises:
             KeyError: no fault has this name.
@@ -607,7 +607,10 @@ class NodeFaults(Copyable):
             self.station.device = _FaultyNode(self.station.device, self)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, and send delayed frames now; do nothing if the fault is not armed."""
+        """Switch off a fault of the node; do nothing if it is not on.
+
+        Frames that were delayed by faults are sent now.
+        """
         if name in self._narrowed:
             self.wire.faults.clear(name, self.node.port.number)
             self._narrowed = tuple(each for each in self._narrowed if each != name)
@@ -630,7 +633,7 @@ class NodeFaults(Copyable):
 
     @property
     def due_us(self) -> int:
-        """The time of the next own action of a fault, or of a delayed frame."""
+        """Time at which a fault next acts by itself, or at which a delayed frame is sent."""
         due_us = self._held[0][0] if self._held else NEVER
         return min([due_us, *(armed.next_us for armed in self._armed.values())])
 
@@ -640,7 +643,13 @@ class NodeFaults(Copyable):
         return not (self._armed or self._held)
 
     def cob_id(self, index: int, sub: int, otherwise: int) -> int:
-        """Return the CAN-ID in an object of the node, or a default if there is no such object."""
+        """Return the CAN-ID that an object of the node contains.
+
+        Args:
+            index: index of the object, such as 1014h for the EMCY.
+            sub: sub-index of the object.
+            otherwise: CAN-ID to return if there is no such object.
+        """
         entry = self.node.slave.dictionary.find(index, sub)
         return otherwise if entry is None else entry.number & CAN_ID_MASK
 
@@ -664,7 +673,15 @@ class NodeFaults(Copyable):
             self.station.device.reset()
 
     def before(self, now_us: int, received: Frames) -> tuple[Frames, Frames]:
-        """Return the frames that the node receives in a tick, and additional frames to send."""
+        """Apply the faults to the frames that the node receives in a tick.
+
+        Args:
+            now_us: time of the tick.
+            received: frames that have arrived.
+
+        Returns:
+            The frames that the node receives, and frames that the faults send in addition.
+        """
         self._now_us = now_us
         if not self.node.is_on:
             self._held.clear()
@@ -684,7 +701,15 @@ class NodeFaults(Copyable):
         return tuple(left), tuple(sent)
 
     def after(self, now_us: int, sent: Frames) -> Frames:
-        """Return the frames sent in a tick: the node's frames after faults, and delayed frames."""
+        """Apply the faults to the frames that the node sends in a tick.
+
+        Args:
+            now_us: time of the tick.
+            sent: frames from the node.
+
+        Returns:
+            The frames to send, with delayed frames of earlier ticks.
+        """
         left = self._released(now_us - 1)
         for frame in sent:
             left += self._send(frame)

@@ -20,7 +20,7 @@ _PRODUCT: Final = 0x1008
 
 @dataclass(frozen=True, slots=True)
 class EmulatedModel:
-    """A device model that needs no file.
+    """A built-in CANopen device, such as `epos`, which can be emulated without an EDS file.
 
     Attributes:
         name: name of the model on command lines and in rig files.

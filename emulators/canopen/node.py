@@ -144,7 +144,11 @@ class Node(Copyable):
         return self.slave.on_accepts
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Accept a change of the CAN controller; the slave gets the change in the next tick."""
+        """Notify the slave of a change in the CAN controller's error state, at its next tick.
+
+        Args:
+            state: new state: error active, error passive or bus-off.
+        """
         self._defer(partial(self.slave.bus_state, state))
 
     def reset(self) -> None:
@@ -189,7 +193,14 @@ class Node(Copyable):
         return [*self.physical, *(signals.object_name(dictionary, entry) for entry in dictionary)]
 
     def begin_with(self, start: Mapping[str, Setting]) -> None:
-        """Set initial values of inputs and objects; raise ValueError if a value is not accepted."""
+        """Set initial values of physical inputs and of objects before the first tick.
+
+        Args:
+            start: values by the names of the signals.
+
+        Raises:
+            ValueError: an input or object is unknown, or does not accept its value.
+        """
         for name, value in start.items():
             if (signal := self.signal(name)) is None:
                 raise ValueError(f"{self.name} has no input {name!r}")
@@ -277,7 +288,9 @@ class _NodePart(Protocol):
 
 
 class NodeSide:
-    """The inputs and outputs of a node, including all objects of its dictionary, or of a body.
+    """The signals of a CANopen node or of a robot body: all its inputs and outputs by name.
+
+    The objects of a node's dictionary are also signals.
 
     Args:
         part: the node, or the body.
@@ -291,7 +304,7 @@ class NodeSide:
 
 
 def side_of(nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> Assembly:
-    """Return the inputs and outputs of all nodes of a bus, and of bodies, as one object.
+    """Return one object with the inputs and outputs of all nodes of a bus, and of robot bodies.
 
     If there is only one node, its signals have their plain names: `0x6000:1`, `state`. With several
     nodes the name of the node is a prefix: `5/0x6000:1`, `5/state`. The name of a body is a prefix
@@ -319,15 +332,29 @@ class _NodeInputs:
         return self._signal(name).read()
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; raise ValueError if it does not exist or does not accept the value."""
+        """Set a physical input or an object of the node.
+
+        Raises:
+            ValueError: the input does not exist, or does not accept the value.
+        """
         self._signal(name).write(value)
 
     def check(self, name: str, value: Setting) -> Setting:
-        """Return the value; raise ValueError as `set` would, as far as that is known in advance."""
+        """Check whether `set` would accept a value, and return the value.
+
+        Some objects can refuse a value only when it is set.
+
+        Raises:
+            ValueError: the input does not exist, or does not accept the value.
+        """
         return self._signal(name).check(value)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if no input has the name and type."""
+        """Return the description of a physical input.
+
+        Raises:
+            ValueError: no input has the name and the type.
+        """
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
             wanted = signal_type.value if signal_type else "input"
@@ -377,10 +404,11 @@ _logger = log_of(__name__)
 
 
 class SecondNodeAlarm(PortBefore):
-    """A port that warns, once for each node, if another node outside has the same node-ID.
+    """A port that warns if another node on the real bus has the node-ID of an emulated node.
 
-    The port checks boot-ups, heartbeats and answers to guarding. A second node that sends no such
-    frame is not detected. A second node is also not detected while the emulated node has no power.
+    There is one warning for each node. The port checks boot-ups, heartbeats and answers to
+    guarding. A second node that sends no such frame is not detected. A second node is also not
+    detected while the emulated node has no power.
 
     Args:
         port: the port on the bus.

@@ -17,7 +17,7 @@ _IDS: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 
 @dataclass(frozen=True, slots=True)
 class NodeSpec:
-    """A node on the command line.
+    """A CANopen node to be emulated, as specified on the command line by `--node`.
 
     Attributes:
         device: EDS or DCF of the node, name of a model, or `FILE.py:Class` of a DeviceRTC.
@@ -31,10 +31,13 @@ class NodeSpec:
 
 
 def parse_node(text: str) -> Iterator[NodeSpec]:
-    """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
+    """Yield the nodes that the text of an option `--node` specifies.
 
-    Any other text raises ValueError. A name such as `epos` means the model, unless a file of this
-    name exists.
+    The text has one of the forms `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` and
+    `a.dcf`. A name such as `epos` means the model, unless a file of this name exists.
+
+    Raises:
+        ValueError: the text has another form.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]

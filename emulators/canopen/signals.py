@@ -49,9 +49,10 @@ class NodeSignal(Protocol):
 
 
 def object_name(dictionary: Dictionary, entry: Entry) -> str:
-    """Return the name of an entry, such as `0x6000:1`, or `0x1017` for a variable.
+    """Return the name of an object in panels and scenarios, such as `0x6000:1`.
 
-    The sub-index is decimal.
+    The number after the colon is the sub-index in decimal. A variable has no sub-index in its name,
+    as in `0x1017`.
     """
     name = f"0x{entry.index:04X}"
     code = dictionary.objects[entry.index].code
@@ -60,7 +61,10 @@ def object_name(dictionary: Dictionary, entry: Entry) -> str:
 
 
 def find_object(dictionary: Dictionary, name: str) -> Entry | None:
-    """Return the entry with the name, or None if there is none; `0x6000` means `0x6000:0`."""
+    """Return the entry of a dictionary that a name such as `0x6000:1` means, or None without one.
+
+    `0x6000` means `0x6000:0`.
+    """
     match = _NAME.fullmatch(name)
     if match is None:
         return None
@@ -73,16 +77,16 @@ _DeferredCall = Callable[[Callable[[], None]], None]
 
 
 class ObjectSignal:
-    """An object of the dictionary, read and set inside the device, not over the bus.
+    """An object of the dictionary as a signal, which is read and set inside the device.
 
-    Access rights are ignored, except that a constant cannot be changed. The service that owns an
+    The bus is not used. Access rights are ignored, except that a constant cannot be changed. The service that owns an
     object checks a new value and acts on it like on a value from the bus. So a heartbeat time that
     is set here takes effect. The value changes at the start of the node's next tick.
 
     Args:
         name: name of the object, as returned by `object_name`.
         entry: the object in the dictionary.
-        later: function that schedules the change.
+        defer: function that schedules the change.
     """
 
     def __init__(self, name: str, entry: Entry, defer: _DeferredCall) -> None:
@@ -192,7 +196,9 @@ _COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
 
 class SwitchSignal:
-    """A physical fault of every node; see `NodeSignal`.
+    """A physical fault that every node has, such as a power cut, as a signal: 0 or 1.
+
+    See `NodeSignal`.
 
     Args:
         name: name of the fault.
@@ -221,11 +227,13 @@ class SwitchSignal:
 
 
 class Emergency:
-    """An error of the application, as emergency error code; 0 means the end of the error.
+    """The signal `emergency`: setting it raises an error in the node, which then sends an EMCY.
+
+    The value is the emergency error code. 0 clears the error.
 
     Args:
         slave: the slave.
-        later: function that schedules the change.
+        defer: function that schedules the change.
     """
 
     def __init__(self, slave: CanopenSlave, defer: _DeferredCall) -> None:
@@ -253,11 +261,11 @@ class Emergency:
 
 
 class Quantity:
-    """A physical input of the device itself: a voltage, a load, a blocked shaft.
+    """A physical input of the device as a signal, such as a voltage, a load or a blocked shaft.
 
     Args:
         bank: the inputs of the node's application.
-        item: the input.
+        item: description of the input.
         on_change: function that is called after each change.
     """
 
@@ -291,10 +299,12 @@ OnSet = Callable[[str, Setting], None]
 
 
 class NotedSignal:
-    """A signal that reports its new values; see `NodeSignal`.
+    """A signal that forwards to another signal, and reports when that is set.
+
+    See `NodeSignal`.
 
     Args:
-        signal: the signal itself.
+        signal: the other signal.
         note: function that is called after each change.
     """
 

@@ -23,9 +23,10 @@ class StoreError(ValueError):
 
 
 class StoreFile:
-    """Keeps the stored data of slaves (1010h, LSS) between runs of the emulator.
+    """A file that keeps the non-volatile memory of slaves between runs of the emulator.
 
-    The file is replaced as a whole, so it is never half written.
+    It contains what slaves store by 1010h and LSS. The file is replaced as a whole, so it is never
+    half written.
 
     Args:
         path: path of the file, which may be missing.
@@ -41,9 +42,14 @@ class StoreFile:
         self._written = self._versions()
 
     def nonvolatile(self, name: str, dictionary: Dictionary) -> Nonvolatile:
-        """Return the memory of a node, which the node changes in place; it is empty for a new node.
+        """Return the non-volatile memory of a node, as read from the file.
 
-        Values that do not fit the dictionary, because the EDS has changed, are dropped.
+        The node changes this object when it stores something. The memory is empty for a new node.
+        Stored values that do not fit the dictionary, because the EDS has changed, are dropped.
+
+        Args:
+            name: name of the node.
+            dictionary: the dictionary of the node.
         """
         memory = self._nodes.setdefault(name, Nonvolatile())
         self._written.setdefault(name, memory.version)
@@ -52,7 +58,10 @@ class StoreFile:
         return memory
 
     def save(self) -> bool:
-        """Write the file if a node has stored something; return whether the file was written.
+        """Write the file if a node has stored something since the file was last written.
+
+        Returns:
+            True if the file was written.
 
         Raises:
             OSError: the file cannot be written. The old file is kept.
@@ -88,11 +97,11 @@ def _multiplexer(key: int) -> str:
 
 
 def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
-    """Read the stored data of a node.
+    """Return the non-volatile memory of a node from its entry in a store file.
 
     Raises:
-        AttributeError, KeyError, TypeError, ValueError: the data are not in
-            the format of `memory_values`.
+        AttributeError, KeyError, TypeError, ValueError: the data are not in the format of
+            `memory_values`.
     """
     parameters = {}
     for name, data in node["parameters"].items():

@@ -147,7 +147,10 @@ def _describe(answer: Any) -> list[str]:
 def verb(
     show: Callable[[Any], list[str]] = _nothing, whom: str = _EMULATOR, **settings: Any
 ) -> Callable[[Callable[..., Object]], click.Command]:
-    """Return a decorator that makes a command from a function that returns its request fields.
+    """Return a decorator that makes a command of `tickrig ctl`.
+
+    The command sends a request to an emulator, and prints the answer. The decorated function
+    returns the fields of the request.
 
     Args:
         show: function that formats the answer as lines of text.

@@ -28,7 +28,14 @@ _MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "r
 
 
 def by_miniterm(link: str, baud: int) -> str:
-    """Return the command to talk to a device with text lines; miniterm comes with pyserial."""
+    """Return a hint for users: the command line with which a terminal program reaches the device.
+
+    The program is miniterm, which comes with pyserial. It suits devices with lines of text.
+
+    Args:
+        link: path of the terminal of the device.
+        baud: bit rate in bit/s.
+    """
     return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
 
 
@@ -102,10 +109,10 @@ class DeviceType:
         object.__setattr__(self, "fields", (*self.fields, *map(_field_of_option, self.options)))
 
     def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
-        """Make the device for a command line or a rig file.
+        """Make a device of this type with the options of a command line or a rig file.
 
         Args:
-            options: values of the fields.
+            options: values of the fields of the type.
             seed: seed of all random numbers.
 
         Raises:
@@ -125,7 +132,7 @@ class DeviceType:
         return ConfiguredDevice(self, device, options)
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
-        """Make the device on which a trace was recorded.
+        """Make a device of this type with the settings that a trace has recorded.
 
         Args:
             config: configuration of the device in the trace.
@@ -145,12 +152,12 @@ class DeviceType:
 
 @dataclass(frozen=True)
 class ConfiguredDevice:
-    """A device as configured on a command line.
+    """A device that was made from a command line or a rig file, with its settings.
 
     Attributes:
         type: device type, after changes by its options.
         device: the device.
-        config: all settings of the device, for the trace.
+        config: all settings of the device, which a trace records.
     """
 
     type: DeviceType
@@ -178,11 +185,12 @@ DEVICES: Final = ExtensionGroup[DeviceType](
 
 
 def configure(name: str, config: Mapping[str, object], seed: int = 0) -> ConfiguredDevice:
-    """Make a device from its type and the values of its fields, as in a rig file.
+    """Make a device of a given type with given settings, as a rig file does.
 
     Args:
         name: name of the device type.
-        config: values by option name of the command line, without dashes; see `read_config`.
+        config: settings by the name of their option on the command line, without dashes; see
+            `read_config`.
         seed: seed of the device's random numbers.
 
     Raises:
@@ -197,12 +205,18 @@ def configure(name: str, config: Mapping[str, object], seed: int = 0) -> Configu
 
 
 def option_names(name: str) -> tuple[str, ...]:
-    """Return the options of a device type without dashes; ExtensionError if the type is unknown."""
+    """Return the names of the options that a device type has, without dashes.
+
+    Raises:
+        ExtensionError: the type is unknown, or cannot be loaded.
+    """
     return tuple(field.word for field in DEVICES.load(name).fields)
 
 
 def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]:
-    """Build the device on which a trace was recorded.
+    """Make a new device with the settings of the device on which a trace was recorded.
+
+    A replay sends it the recorded input.
 
     Args:
         header: header of the trace.
@@ -219,7 +233,11 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
 
 
 def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
-    """Refuse Python files named in a trace: a replay runs a program only with `run_code`.
+    """Raise an error if a trace would make the replay run a Python file without permission.
+
+    Args:
+        named: settings in the trace, of which one may name a Python file.
+        run_code: whether the user has allowed it with `--run-code`.
 
     Raises:
         ValueError: the trace names a `FILE.py:Class`, and `run_code` does not allow it.
@@ -230,13 +248,16 @@ def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
 
 
 def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = True) -> None:
-    """Raise ValueError unless a configuration has only settings of a device.
+    """Check that a configuration from a trace has only settings that the device has.
 
     Args:
         config: the configuration, as in a trace.
-        defaults: all settings with their defaults.
+        defaults: all settings of the device with their defaults.
         owner: start of the message, such as `an RRC has no setting`.
         typed: whether a value must have the type of its default.
+
+    Raises:
+        ValueError: a setting is unknown, or its value has another type.
     """
     for name, value in config.items():
         if name not in defaults:

@@ -416,7 +416,13 @@ def _rows_of(probe: _Probe) -> list[_CheckRow]:
 
 
 def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
-    """Print the table, and return the exit status: 1 if something needed is missing.
+    """Check the installation, print a table of the checks, and return the exit status.
+
+    The status is 1 if something needed is missing.
+
+    Args:
+        as_json: whether to print JSON in place of the table.
+        needs: names of checks that must succeed, in addition to those that are always needed.
 
     Raises:
         Refused: a name in `needs` is not the name of a check.

@@ -65,7 +65,10 @@ class _DeviceGroup(LazyGroup):
 
 
 def device_command(device_type: DeviceType) -> click.Command:
-    """Make the command line of a device type with its own options and the common options."""
+    """Return the click command `tickrig emu NAME` of a device type.
+
+    It has the options of the type and the options of all devices on a serial line.
+    """
     declared = {option.name: option for option in device_type.options}
 
     @run_options.device_options(field for field in device_type.fields if field.name not in declared)

@@ -102,12 +102,15 @@ _OF_FRAMES: Final = {
 
 
 def files(name: str, module: str, *, binary: bool = False) -> dict[str, str]:
-    """Return the files of a new package: the text of each by its path in the folder.
+    """Return the files of the package that `tickrig new device` writes.
 
     Args:
         name: name of the device for `tickrig emu`.
         module: name of the device's Python module.
         binary: whether the device exchanges frames instead of lines.
+
+    Returns:
+        The text of each file, by its path in the folder of the package.
     """
     words = {"name": name, "module": module, "cls": module.title().replace("_", "")}
     kind = {

@@ -22,7 +22,9 @@ _PLOTTER: Final = "matplotlib"
 
 
 def check_plot(path: Path, option: str = "--plot", *others: str) -> None:
-    """Refuse, before a run, a picture that could not be written after the run.
+    """Check before a run that its picture can be written after the run.
+
+    If it cannot, the command ends with a message.
 
     Args:
         path: path of the picture.
@@ -47,7 +49,12 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, title: str, path: Path) -> None:
-    """Write a figure as PNG, SVG or HTML, by the name of the file.
+    """Write a matplotlib figure as PNG, SVG or HTML, according to the suffix of the file.
+
+    Args:
+        figure: the figure.
+        title: title of the HTML page.
+        path: path of the file.
 
     Raises:
         OSError: the file cannot be written.

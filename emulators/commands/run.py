@@ -61,7 +61,7 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
         self._stopped = False
 
     def run(self) -> int:
-        """Run, and return the exit status.
+        """Run the emulator until it is stopped, and return the exit status of the command.
 
         Raises:
             Refused: the options cannot be carried out.
@@ -186,7 +186,9 @@ def _read(scenario: Path | None) -> tuple[str, str]:
 
 @contextmanager
 def mistakes_in(specs: Iterable[object]) -> Iterator[None]:
-    """Report in one line an exception of a callback in a user's file; re-raise others.
+    """Context that reports an exception of a user's code as an error message of one line.
+
+    An exception that does not come from the user's files is raised unchanged.
 
     Args:
         specs: specifications of the devices. Each `FILE.py:Class` is user code.

@@ -59,7 +59,9 @@ def _field_option(field: DeviceField) -> Decorator:
 
 
 def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
-    """Return a decorator that adds the fields of `run.RunOptions`, and --version.
+    """Return a decorator that adds the options of all emulators to a click command.
+
+    They are the fields of `run.RunOptions`, and `--version`.
 
     Args:
         wire_faults: names of wire faults, separated by commas.
@@ -100,12 +102,14 @@ panel_option: Final[Decorator] = click.option(
 
 
 def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSignal]]) -> Decorator:
-    """Return a decorator that adds the options of a device on a serial line, and --version.
+    """Return a decorator that adds the options of all devices on a serial line to a click command.
+
+    They are `--link`, `--serve`, `--trace` and those of `run_options`.
 
     Args:
         wire_faults: names of wire faults, separated by commas.
         inputs: function that returns the physical inputs of the device for shell completion, or the
-            place of a table of the inputs, `MODULE:NAME`.
+            position of a table of the inputs as `MODULE:NAME`.
     """
 
     def device_faults(context: click.Context) -> list[str]:
@@ -131,7 +135,7 @@ def _complete_serve(context: click.Context, option: click.Parameter, begun: str)
 
 
 def run_named(name: str, options: Mapping[str, Any]) -> int:
-    """Run a device for a command line, and return the exit status.
+    """Run an emulated device of a given type for its command, and return the exit status.
 
     Args:
         name: name of a device type in `device_type.DEVICES`.
@@ -154,14 +158,14 @@ def serial_command(
     *,
     panel: bool = False,
 ) -> Callable[[Callable[[], None]], click.Command]:
-    """Return a decorator that makes the command of a device on a serial line.
+    """Return a decorator that makes the click command of an emulated device on a serial line.
 
-    The docstring of the decorated function is the help text; its body is empty.
+    The docstring of the decorated function becomes the help text. Its body is empty.
 
     Args:
         name: name of a device type in `device_type.DEVICES`.
-        fields: fields of the device.
-        inputs: place of the table of physical inputs, as `MODULE:NAME`.
+        fields: fields of the device, which become options.
+        inputs: position of the table of physical inputs, as `MODULE:NAME`.
         wire_faults: names of wire faults, separated by commas.
         panel: whether the device has an operator panel.
     """
@@ -192,7 +196,9 @@ def device_types() -> ExtensionGroup[DeviceType]:
 
 
 def type_option(text: str) -> Decorator:
-    """Return a decorator that adds `--type NAME`, which the shell completes.
+    """Return a decorator that adds the option `--type NAME` to a click command.
+
+    The shell completes the names of the device types.
 
     Args:
         text: help text of the option.

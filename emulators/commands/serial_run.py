@@ -48,7 +48,7 @@ class _Options(RunOptions):
 
 
 def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
-    """Run a device for a command line, and return the exit status.
+    """Make a device from the options of its command, run it, and return the exit status.
 
     Args:
         device_type: type of the device.

@@ -228,15 +228,15 @@ class _Program:
 
 
 class ConvoyRun:
-    """A run of an experiment: its robots and components, and their recorded motions.
+    """A run of a demonstration in which robots follow one another, with their recorded motions.
 
     Args:
-        experiment: the experiment.
-        echo: function that receives a line of the table every 2 s.
-        clock: clock of a run in real time. Without a clock the run is in virtual time.
+        experiment: the experiment, with its robots and acts.
+        echo: function that is called with a line of the table every 2 s.
+        clock: clock of a run in real time, or None for a run in virtual time.
 
     Attributes:
-        convoy: convoy of the robots.
+        convoy: the robots and their components.
         tracks: tracks of the robots, in the order of their numbers.
         marks: changes of connectors.
     """

@@ -38,7 +38,9 @@ _FULL_SCALE_DEG: Final = 180.0
 
 
 class CurveSample(NamedTuple):
-    """The state of both devices at one time.
+    """The state of both devices of the demonstration `fig120` at one time.
+
+    The potentiometer of the I/O module (palette) controls the angle of the motor.
 
     Attributes:
         time_s: seconds since the potentiometer was first turned.
@@ -78,7 +80,11 @@ _TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32
 
 
 def write_plot(samples: Sequence[CurveSample], path: Path) -> None:
-    """Draw voltage, reference and angle over time, and write a PNG, SVG or HTML file.
+    """Draw voltage, reference and angle of the demonstration over time, and write the picture.
+
+    Args:
+        samples: recorded states of both devices.
+        path: path of a PNG, SVG or HTML file.
 
     Raises:
         OSError: the file cannot be written.
@@ -174,7 +180,9 @@ _START_ORDER: Final = (MOTOR, PALETTE)
 
 
 def set_up(network: canopen.Network) -> None:
-    """Link the potentiometer with the motor, and start both nodes.
+    """Configure and start both nodes, so that the potentiometer controls the motor.
+
+    A master does this with SDOs. Afterwards no master is needed.
 
     Raises:
         canopen.SdoCommunicationError: a node does not answer.
@@ -274,11 +282,11 @@ _Fig120Stage = VirtualStage | _BusStage
 def bus_stage(
     arguments: Sequence[str], open_bus: Callable[[], can.BusABC]
 ) -> Iterator[_Fig120Stage]:
-    """Start the emulator on a bus, and a master on the same bus.
+    """Context in which the emulator and a master run on the same real CAN bus, for a demonstration.
 
     Args:
-        arguments: arguments of a command line that select the bus.
-        open_bus: function that opens the same bus.
+        arguments: arguments of the emulator's command line that select the bus.
+        open_bus: function that opens the same bus for the master.
 
     Raises:
         RuntimeError: the emulator does not start.

@@ -100,7 +100,10 @@ class _DemoTranscript:
 
 
 def run_demo(echo: _Echo) -> None:
-    """Run the demonstration; it takes about five seconds.
+    """Start an emulated RRC, and run the demonstration on it, which takes about five seconds.
+
+    Args:
+        echo: function that is called with each line to print.
 
     Raises:
         RuntimeError: the emulator does not start.
@@ -115,7 +118,12 @@ def run_demo(echo: _Echo) -> None:
 
 
 def play(link: Link[bytes], request: _Request, echo: _Echo) -> None:
-    """Run the demonstration on an existing emulator.
+    """Run the demonstration of the RRC on an emulator that is already running.
+
+    Args:
+        link: serial link to the RRC.
+        request: function that sends a request to the control socket of the emulator.
+        echo: function that is called with each line to print.
 
     Raises:
         LinkError, DeviceRefused: the link or the device has reported an error.

@@ -40,7 +40,10 @@ _POWER_CUT: Final = "power_cut"
 
 
 class VirtualSetup:
-    """The nodes on serial lines in virtual time, which passes as fast as it can be computed."""
+    """The nodes of the RTC-Lite demonstration on serial lines in virtual time.
+
+    Virtual time passes as fast as it can be computed.
+    """
 
     def __init__(self) -> None:
         lines = {name: SerialLine(_BAUD) for name in NODES}
@@ -93,7 +96,9 @@ _DemoSetup = VirtualSetup | _PtySetup
 
 @contextmanager
 def pty_setup() -> Iterator[_PtySetup]:
-    """Start both emulators, and open their terminals.
+    """Context with the nodes of the RTC-Lite demonstration as emulators in processes of their own.
+
+    The host reaches them by terminals (ptys), in real time.
 
     Raises:
         RuntimeError: an emulator does not start.
@@ -133,7 +138,11 @@ _SETTINGS: Final = ProxySettings(rediscover=True)
 
 
 def run_demo(setup: _DemoSetup, echo: _Echo) -> None:
-    """Run the demonstration; it takes six seconds of the stage's time.
+    """Run the RTC-Lite demonstration, which takes six seconds, either real or virtual.
+
+    Args:
+        setup: nodes of the demonstration, in virtual time or as processes.
+        echo: function that is called with each line to print.
 
     Raises:
         RuntimeError: an expected event did not happen in time.

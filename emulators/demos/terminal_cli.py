@@ -167,7 +167,12 @@ def _draw(
 
 
 def show_fig120(plot: Path | None, **options: Any) -> None:
-    """Run the demonstration of Fig. 120, and draw its curves to a file, if one is given."""
+    """Run the demonstration of Fig. 120 in the terminal, and draw its curves if a file is given.
+
+    Args:
+        plot: path of the picture, or None.
+        options: options of the bus.
+    """
     if plot is not None:
         picture.check_plot(plot)
     samples = _play(BusOptions(**options))

@@ -31,13 +31,15 @@ from tickrig.wire.ucode import BAUD, MAX_LEVEL
 
 @dataclass(slots=True)
 class Estimate:
-    """An estimated position on a plane; the method is a choice of the demonstration.
+    """The position of a robot on a plane, estimated from its odometry and from infra-red markers.
+
+    The method of estimation is a choice of the demonstration.
 
     Attributes:
-        range_m: range of the reader.
-        x_m: estimated position in x.
-        y_m: estimated position in y, which is to the left of x.
-        fixes: number of corrections of the estimate by a place.
+        range_m: range of the reader that receives the markers, in metres.
+        x_m: estimated position in x, in metres.
+        y_m: estimated position in y, which is to the left of x, in metres.
+        fixes: number of corrections of the estimate by a marker.
     """
 
     range_m: float

@@ -139,7 +139,7 @@ def parse_component_profile(fields: bytes) -> LiteComponentProfile:
 
 
 def parse_reply(frame: LiteFrame) -> LiteReply:
-    """Read the data of a reply.
+    """Parse the data of a reply frame from an RTC-Lite device.
 
     Raises:
         FramingError: the frame is not a reply, or has a wrong length.

@@ -66,12 +66,20 @@ _STATES: Final = {
 
 
 def encode_request(frame: LiteFrame) -> bytes:
-    """Return a request as a packet; raise KeyError if RTno has no letter for the request."""
+    """Return an RTC-Lite request of the proxy as a packet of RTno.
+
+    Raises:
+        KeyError: RTno has no letter for the request.
+    """
     return pack(LETTERS[frame.command], frame.data)
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Return a frame of the device as a packet; raise KeyError if RTno has no letter for it."""
+    """Return an RTC-Lite frame of the device as a packet of RTno.
+
+    Raises:
+        KeyError: RTno has no letter for the frame.
+    """
     return pack(LETTERS[frame.command], _packet_data(frame))
 
 
@@ -100,10 +108,10 @@ class RtnoPacket(NamedTuple):
 
 @dataclass(slots=True)
 class RtnoPacketDecoder:
-    """Reads packets in either direction from a byte stream.
+    """Finds RTno packets in a stream of received bytes. It is the base class of both directions.
 
     Attributes:
-        lost: whether too much data was announced. All bytes are then discarded until `clear`.
+        lost: whether a packet announced too much data. All bytes are then discarded until `clear`.
     """
 
     lost: bool = field(default=False, init=False)
@@ -154,9 +162,9 @@ class RtnoPacketDecoder:
 
 @dataclass(slots=True)
 class RtnoDecoder(RtnoPacketDecoder):
-    """Reads the packets of a proxy as frames, and is used in the same way as `LiteDecoder`.
+    """Converts RTno packets of a proxy to RTC-Lite frames, for use at a device.
 
-    An unknown letter has the same effect as too much data.
+    It is used like `LiteDecoder`. An unknown letter has the same effect as too much data.
     """
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
@@ -180,11 +188,12 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 
 @dataclass(slots=True)
 class RtnoReplies(RtnoPacketDecoder):
-    r"""Reads the packets of a device as frames, and is used in the same way as `Decoder(REPLIES)`.
+    r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy.
 
-    RTno omits parts of a frame: the status of a state, the state after a command, the numbers and
-    the type of a profile. This decoder adds the omitted parts that follow from the other parts. The
-    state after a refusal is `?`, which is not a state.
+    It is used like `LiteDecoder(REPLIES)`. RTno omits parts of a frame: the status of a state, the
+    state after a command, the numbers and the type of a profile. This decoder adds the omitted
+    parts that follow from the other parts. The state after a refused command is unknown, so it is
+    written as `?`.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]

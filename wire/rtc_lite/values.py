@@ -24,7 +24,9 @@ _MAX_NAME_BYTES: Final = 15
 
 
 def encode_name(name: str) -> bytes:
-    """Return the bytes of a name: 1 to 15 printable ASCII characters, no blanks (DECISION L6).
+    """Return the bytes of the name of a port or a component type.
+
+    A name has 1 to 15 printable ASCII characters without blanks (DECISION L6).
 
     Raises:
         FieldError: the name is empty, is too long, or has other characters.
@@ -44,7 +46,7 @@ _TEXT: Final = "latin-1"
 
 @dataclass(frozen=True, slots=True)
 class LitePortType(Generic[T]):
-    """A data type of a port.
+    """The data type of a port of an RTComponent-Lite.
 
     Attributes:
         code: letter of the type, in upper case for a sequence.
@@ -66,7 +68,11 @@ class LitePortType(Generic[T]):
         return self.code.isupper()
 
     def encode(self, value: T) -> bytes:
-        """Return the bytes of a value; raise FieldError if the value does not have this type."""
+        """Encode a value of this type as bytes.
+
+        Raises:
+            FieldError: the value does not have this type.
+        """
         if self.format == _TEXT:
             return self._encode_text(cast(str, value))
         values: Any = value if self.sequence else (value,)
@@ -76,7 +82,11 @@ class LitePortType(Generic[T]):
             raise FieldError(f"{self.name} cannot be {values}: {error}") from None
 
     def decode(self, data: bytes) -> T:
-        """Return the value of bytes; raise FieldError if the bytes do not have this type."""
+        """Decode bytes into a value of this type.
+
+        Raises:
+            FieldError: the number of bytes does not fit this type.
+        """
         self.check_size(data)
         if self.format == _TEXT:
             return cast(T, data.decode("latin-1"))

@@ -62,7 +62,11 @@ _Decode = Callable[[bytes], tuple[Any, int]]
 
 
 def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
-    """Return the bytes of a struct; raise FieldError if a field does not fit its IDL type."""
+    """Encode a struct of an IDL file as bytes in CDR, the format of CORBA.
+
+    Raises:
+        FieldError: a field does not fit its IDL type.
+    """
     coder = _codec(type(value), endian)[0]
     try:
         return coder(value)
@@ -71,7 +75,11 @@ def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
 
 
 def decode(kind: type[S], data: bytes, endian: Endian = Endian.LITTLE) -> S:
-    """Return the struct in the bytes; raise FieldError if the bytes are not one struct."""
+    """Decode bytes in CDR, the format of CORBA, into a struct of an IDL file.
+
+    Raises:
+        FieldError: the bytes are not one struct of this kind.
+    """
     try:
         value, end = _codec(kind, endian)[1](data)
     except UnicodeError as error:

@@ -91,17 +91,17 @@ def _define_methods(kind: Any) -> None:
 
 
 def define(source: str, scope: dict[str, Any]) -> None:
-    """Define functions from source generated for the fields of a struct.
+    """Execute source text that defines functions, which was generated for the fields of a struct.
 
     Args:
-        source: source, which uses only names of fields and of `scope`.
+        source: source text, which uses only names of fields and of `scope`.
         scope: globals of the functions. The defined functions are added to it by name.
     """
     exec(source, scope)
 
 
 class Struct(metaclass=_StructType):
-    """A struct of an IDL file: a frozen value that can be made without arguments.
+    """Base class of the structs of IDL files: immutable values that can be made without arguments.
 
     Values are not checked until they are encoded.
 

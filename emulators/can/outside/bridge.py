@@ -15,7 +15,7 @@ _HANDOVER_US: Final = 1_000
 
 
 class CanBridge:
-    """A bridge between one end of an emulated bus and a bus of python-can.
+    """Connects one end of an emulated bus with a real bus that python-can opens.
 
     The nodes of the rig communicate on their own wire, and the outside receives each of their
     frames once. Frames from outside are sent on the wire like those of one more node, so they take
@@ -23,7 +23,7 @@ class CanBridge:
 
     Args:
         end: an end of the wire without a station.
-        outside: port of the outside world.
+        outside: port of the bus outside.
     """
 
     def __init__(self, end: CanEnd, outside: Port[Frames]) -> None:
@@ -37,10 +37,10 @@ class CanBridge:
         return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
-        """Send on the wire the frames that came from outside since the last poll.
+        """Send the frames that have come from outside since the last poll on the emulated bus.
 
-        The frames may have been sent at any time since the last poll. They count as sent right
-        after the last poll, so a host loses no tick by the polling.
+        They may have been sent at any time since the last poll. They count as sent right after the
+        last poll, so a host loses no tick by the polling.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)
@@ -62,7 +62,9 @@ class CountingPort(Port[Frames], Protocol):
 
 
 class PortBefore:
-    """A port that forwards all traffic to and from another port.
+    """Base class of ports that change or watch the traffic of another port.
+
+    This class forwards all traffic unchanged.
 
     Args:
         port: port to which all traffic is forwarded.
@@ -91,7 +93,9 @@ class PortBefore:
 
 
 class WithoutEcho(PortBefore):
-    """A port on python-can's udp_multicast bus that drops the echo of its own frames.
+    """A port that drops the echo of its own frames, for python-can's udp_multicast bus.
+
+    That bus also delivers frames to their sender.
 
     Args:
         port: the port on the bus.

@@ -26,7 +26,9 @@ _LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture be
 
 
 class Repeat:
-    """Frames that are sent in turn, one frame per period, like the periodic task of a driver.
+    """Frames that a host sends periodically, like the periodic task of a CAN driver.
+
+    One frame is sent in each period, in turn.
 
     Attributes:
         frames: the frames. New frames are used from the next period on.
@@ -50,7 +52,9 @@ class Repeat:
 
 
 class CanHost:
-    """A `StampedLink` into a rig: waiting advances the virtual time.
+    """A host on an emulated bus in virtual time: while the host waits, the time advances.
+
+    It is a `StampedLink`.
 
     Args:
         rig: the rig to advance.
@@ -86,15 +90,26 @@ class CanHost:
             self._end.send(self._rig.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
-        """Return whether this host sent the frame that ended at a time; called once per frame."""
+        """Return whether this host sent a received frame. Call it only once for each frame.
+
+        Args:
+            at_us: time at which the frame ended.
+        """
         own = at_us in self._own
         self._own.discard(at_us)
         return own
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
-        """Send the frames in turn, one now and one in each period, until the repeat is stopped.
+        """Send frames periodically: one now, and the next one in each period, in turn.
 
         The frames are sent whenever any code advances the rig's time.
+
+        Args:
+            frames: frames to send.
+            period_us: time between two frames.
+
+        Returns:
+            An object that can change or stop the transmission.
         """
         if period_us < 1 or not frames:
             raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
@@ -118,12 +133,15 @@ class CanHost:
         return self._rig.now_us, received
 
     def take(self, timeout_us: int | None, *, more: bool = False) -> tuple[int, CanFrame] | None:
-        """Wait until a frame has arrived; return time and frame, or None after the timeout.
+        """Wait for a frame, and return it with its time.
 
         Args:
             timeout_us: longest wait; None for no limit.
             more: whether this call continues a wait with a timeout. The whole wait counts once
                 (`HostLimit`).
+
+        Returns:
+            Time and frame, or None after the timeout.
 
         Raises:
             LinkClosed: the link was closed.

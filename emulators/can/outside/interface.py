@@ -45,7 +45,12 @@ class _CanChannels:
 
     @contextmanager
     def offer(self, name: str, rig: Rig, wire: CanWire) -> Iterator[None]:
-        """Allow a bus of a rig to be opened under a name.
+        """Context in which python-can can open a bus of a rig under a channel name.
+
+        Args:
+            name: name of the channel.
+            rig: rig with the bus.
+            wire: the bus.
 
         Raises:
             ValueError: the name is already offered.
@@ -59,7 +64,7 @@ class _CanChannels:
             del self._channels[name]
 
     def open(self, name: str, *, hears_own: bool = False) -> CanHost:
-        """Connect another host to a bus.
+        """Connect a new host to the bus that is offered under a name.
 
         Args:
             name: name of the bus.

@@ -31,14 +31,14 @@ _Names = Mapping[str, object]
 
 
 def retime(target: object, names: _Names, library: str) -> None:
-    """Replace global names in the methods of an object.
+    """Let the methods of an object use other functions in place of global names, such as a clock.
 
-    Methods of classes outside the library are not changed. So a subclass whose own methods read
-    the clock reads the real clock.
+    This makes a library run in virtual time. Methods of classes outside the library are not
+    changed, so a subclass whose own methods read the clock reads the real clock.
 
     Args:
         target: the object, whose class must not have slots.
-        names: replacements of the names.
+        names: replacements of the global names.
         library: name of the package whose classes are changed.
     """
     cls = type(target)
@@ -47,7 +47,10 @@ def retime(target: object, names: _Names, library: str) -> None:
 
 
 def retimed(cls: type, names: _Names, library: str) -> type:
-    """Return a subclass with replaced global names; the class itself if no method uses them."""
+    """Return a subclass whose methods use other functions in place of global names.
+
+    If no method uses one of the names, return the class itself. See `retime`.
+    """
     members = {
         name: copied
         for name, (owner, member) in _members(cls).items()

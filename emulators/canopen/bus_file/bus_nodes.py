@@ -305,7 +305,7 @@ class _NodeMaker:
 
 @dataclass(frozen=True, slots=True)
 class BusNodes:
-    """The CANopen slaves that a bus.yml describes.
+    """The CANopen slaves that a bus.yml describes, ready to be emulated.
 
     Attributes:
         nodes: slaves in the order of the file.
@@ -322,7 +322,9 @@ def read_bus(
     cache: eds.EdsCache | None = None,
     profile: str = AUTO,
 ) -> BusNodes:
-    """Read a bus.yml and the files it names, and make its slaves once.
+    """Read a bus.yml and the files it names, and describe its slaves.
+
+    The result is read again only if one of the files has changed.
 
     Args:
         path: path of the bus.yml.
@@ -348,10 +350,15 @@ def read_bus(
 
 
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return the errors and warnings that `BusFile` does not find: in `tickrig:`, the robot, ...
+    """Check a bus.yml for errors that prevent its slaves from being emulated.
+
+    `BusFile` itself does not find these errors: those in `tickrig:`, in the robot, and others.
 
     Args:
         bus: content of the file. Without slaves there is nothing to check.
+
+    Returns:
+        The errors and warnings.
     """
     if not bus.slaves:
         return ()

@@ -87,7 +87,10 @@ class JointDrive:
 
     @property
     def servo(self) -> ServoParameters:
-        """Motor, power stage and gear: the preset, scaled to the torque and speed of the joint."""
+        """Parameters of the motor, the power stage and the gear of this joint's drive.
+
+        They are those of the chosen preset, scaled to the torque and the speed of the joint.
+        """
         servo = self._with_supply(PRESETS[self.motor])
         turn = self.per_turn / (2 * pi)
         ratio = self.gear_ratio
@@ -284,7 +287,9 @@ _NEVER_ZERO: Final = frozenset(
 def complete(
     dictionary: Dictionary, modes: Collection[int], added: Collection[int], defaults: _Defaults
 ) -> Dictionary:
-    """Return the dictionary of a drive with missing values filled in and missing objects added.
+    """Return the dictionary of a drive, completed so that the drive can be emulated.
+
+    Missing values are filled in and missing objects are added.
 
     Args:
         dictionary: the dictionary of the drive's EDS.

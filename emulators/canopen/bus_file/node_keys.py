@@ -24,7 +24,7 @@ from tickrig.host.text.values import Setting
 
 
 class BusMistakesError(ValueError):
-    """The files have errors, so that no slaves can be made.
+    """Error in a bus.yml or in the files it names, because of which no slaves can be made.
 
     Attributes:
         mistakes: all errors, by file and line.
@@ -44,10 +44,10 @@ _MOST: Final = 1e6
 
 @dataclass(frozen=True, slots=True)
 class NodeKeys:
-    """The settings of a node under `tickrig:`.
+    """The settings under the key `tickrig:` of a node in a bus.yml, which describe its emulation.
 
     Attributes:
-        joint: attributes of `JointDrive` by name.
+        joint: arguments of `JointDrive` by name.
         modes: numbers of the node's modes of operation, or None to use the modes in its files.
         profile: name of `choices.PROFILES`, or None for `auto`.
         configured: whether the node starts with the values that its master writes to it.
@@ -219,12 +219,14 @@ _ARGUMENTS: Final = {
 def read_keys(
     layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[FileMistake]
 ) -> NodeKeys:
-    """Read the mappings `tickrig:` of a node. If several mappings have a key, the first is used.
+    """Read the settings under `tickrig:` that apply to a node of a bus.yml.
+
+    The settings of the node have priority over those of all nodes.
 
     Args:
         layers: the mapping of the node, then the mappings of all nodes.
-        where: name of the node, for mistakes.
-        mistakes: list that collects errors.
+        where: name of the node, for error messages.
+        mistakes: list to which errors are added.
     """
     found: dict[str, Any] = {}
     places: dict[str, FilePlace] = {}

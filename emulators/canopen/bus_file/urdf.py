@@ -73,7 +73,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """The content of a URDF file.
+    """The content of a URDF file, the description of a robot in ROS.
 
     Attributes:
         name: name of the file.
@@ -85,7 +85,7 @@ class Urdf:
 
 
 def read_urdf(path: Path) -> Urdf:
-    """Read a URDF file.
+    """Read the joints of a robot from a URDF file.
 
     Raises:
         OSError: the file cannot be read.
