@@ -79,9 +79,10 @@ _DeferredCall = Callable[[Callable[[], None]], None]
 class ObjectSignal:
     """An object of the dictionary as a signal, which is read and set inside the device.
 
-    The bus is not used. Access rights are ignored, except that a constant cannot be changed. The service that owns an
-    object checks a new value and acts on it like on a value from the bus. So a heartbeat time that
-    is set here takes effect. The value changes at the start of the node's next tick.
+    The bus is not used. Access rights are ignored, except that a constant cannot be changed. The
+    service that owns an object checks a new value and acts on it like on a value from the bus. So a
+    heartbeat time that is set here takes effect. The value changes at the start of the node's next
+    tick.
 
     Args:
         name: name of the object, as returned by `object_name`.
