@@ -105,7 +105,7 @@ class Contact:
     slip_m_s: float = field(default=0.0, init=False)
 
     def roll(self, turn_rad: float, step_s: float) -> float:
-        """Turn the wheel by an angle and return its way over the ground, in metres.
+        """Turn the wheel by an angle; return the distance that it rolls over the ground, in metres.
 
         The wheel turns at a steady speed. It slips if friction cannot change its speed over the
         ground fast enough.

@@ -90,7 +90,7 @@ def check_rate(name: str, rate: float) -> None:
 
     Args:
         name: name of the fault, for the message.
-        rate: probability of the fault, for example for each byte.
+        rate: rate of the fault, which is the probability that it happens.
     """
     if not 0 < rate <= 1:
         raise ValueError(f"{name} takes a rate above 0 and up to 1, as {name}=0.01; got {rate:g}")

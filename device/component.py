@@ -115,10 +115,10 @@ class CallbackRunner(Generic[C]):
 
 @dataclass(slots=True)
 class Timer:
-    """A timer that calls `on_execute` of a component periodically (RTC-Lite type 22h, DeviceRTC).
+    """Timer that determines when the periodic callback of a component runs.
 
-    The periods are counted from the start of the timer, so the timer does not drift. Missed periods
-    are skipped.
+    It is an execution context (RTC-Lite type 22h, DeviceRTC). The periods are counted from the
+    start of the timer, so the timer does not drift. Missed periods are skipped.
 
     Attributes:
         rate_hz: number of periods in a second. A new rate applies from the next start.
@@ -180,7 +180,7 @@ def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
 
 
 def shown(value: Any) -> float | str:
-    """Return the value of a port in the form in which panels and scenario files show it.
+    """Return the value of a port in the form in which it is shown as a physical output.
 
     A boolean becomes a number, and a sequence becomes a text with blanks.
     """

@@ -16,7 +16,7 @@ from tickrig.device.twin import Immutable
 
 
 class SignalType(Enum):
-    """Type of a physical input, which decides its values and how a panel shows it.
+    """Type of a physical input of a device: quantity, button, text or fault.
 
     Attributes:
         LEVEL: a quantity, such as the position of a stick, a voltage or a load.

@@ -20,7 +20,7 @@ from tickrig.wire.ucode import MAX_LEVEL, ROUNDS, LineType, UcodeLine, parse_uco
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReaderParameters(Immutable):
-    """Parameters of an infra-red reader for ucodes: its range and its angle of reception.
+    """Range and angle of reception of an infra-red reader for ucodes (128-bit identifiers).
 
     Attributes:
         range_m: range at which the reader receives a marker, 0.1..99 m.

@@ -299,9 +299,10 @@ class Status(IntFlag):
 
 
 class Fault(IntFlag):
-    """Reasons for which the driver has switched a wheel off, as bits of registers 0201h and 0202h.
+    """Reasons for which the driver of a two-wheeled base has switched a wheel off, as bits.
 
-    They are our choice because the proposal defines none.
+    They are in the registers 0201h and 0202h. They are our choice because the proposal defines
+    none.
     """
 
     OVER_CURRENT = 0x01
@@ -311,7 +312,9 @@ class Fault(IntFlag):
 
 
 class Report(NamedTuple):
-    """The 12 registers from `Address.STATUS` on, which a master reads in each period.
+    """The 12 Modbus registers that a master reads from a two-wheeled base in each period.
+
+    They begin at `Address.STATUS`.
 
     Attributes:
         status: status of the driver.

@@ -272,8 +272,8 @@ class PlacedPort:
     def cob_id(self) -> int | None:
         """CAN-ID of the port's PDO, or None if the PDO is off.
 
-        An in-port has an RPDO, an out-port has a TPDO. If `relative` is true, the node-ID must be
-        added.
+        An in-port has an RPDO, and an out-port has a TPDO. If `relative` is true, the node-ID must
+        be added to the CAN-ID.
         """
         if not self.relative:
             return self.profile.cob_id

@@ -93,7 +93,11 @@ _MOST: Final = 4
 
 
 def encode_numbers(values: Sequence[int], width: int) -> bytes:
-    """Encode numbers in the SCIP notation, each as `width` (1 to 4) characters of 6 bits.
+    """Encode numbers in the notation of SCIP, the protocol of URG sensors.
+
+    Args:
+        values: the numbers.
+        width: number of characters of each number, 1 to 4. A character has 6 bits.
 
     Raises:
         FieldError: a number needs more characters.
@@ -113,7 +117,11 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
 
 
 def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
-    """Decode numbers from the SCIP notation, each from `width` (1 to 4) characters of 6 bits.
+    """Decode numbers from the notation of SCIP, the protocol of URG sensors.
+
+    Args:
+        data: the characters of all numbers.
+        width: number of characters of each number, 1 to 4. A character has 6 bits.
 
     Raises:
         FieldError: a character is invalid.
@@ -357,7 +365,9 @@ class Reply:
 
 @mypyc_attr(serializable=True)
 class ReplySplitter:
-    """Splits a stream of received bytes into SCIP replies, however it is divided into chunks.
+    """Splits a stream of received bytes into replies of a URG sensor (SCIP).
+
+    The bytes may be divided into chunks in any way.
 
     Attributes:
         garbled: number of invalid replies, which were dropped.

@@ -30,7 +30,7 @@ _LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
 
 
 class LineType(Enum):
-    """Kind of a line that a ucode reader sends.
+    """Kind of a line that a reader of ucodes (128-bit identifiers) sends.
 
     Attributes:
         READER: line after power-up and in answer to ID, with the version of the protocol, the range

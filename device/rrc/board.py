@@ -97,12 +97,13 @@ _SHOWN_PERIODS: Final = 10
 
 @dataclass(slots=True)
 class LoadAccount:
-    """Account of the processor's work in an RRC, which shows when the RRC cannot keep up.
+    """Account of the work of an RRC, a wheelchair controller: it shows when the RRC cannot keep up.
 
-    Work that exceeds a period of 10 ms is left over for the next one. Each received line feed costs
-    work, whatever happens to its line, and so do bytes that an overflow discards. Two commands and
-    a status line take exactly one period, so the backlog stays constant. Two OK lines in addition
-    exceed the period by 30 %, and VR2 stops in the tenth such tick.
+    Work that does not fit into a period of 10 ms is left over for the next one. Each received line
+    feed costs work, whatever happens to its line, and so do bytes that an overflow discards. Two
+    commands and a status line take exactly one period, so the backlog stays constant. Two OK lines
+    in addition exceed the period by 30 %, and the RRC stops the wheelchair (VR2) in the tenth such
+    tick.
 
     Attributes:
         backlog_pct: work that is left over, in per cent of a period.
@@ -129,7 +130,7 @@ class LoadAccount:
     def spend(
         self, line_feeds: int, overflows: int, replies: int, *, status: bool, extra_pct: int
     ) -> None:
-        """Add the work of one period in which VR2 runs, and subtract the time of the period.
+        """Add the work of one period in which the wheelchair (VR2) runs, and subtract one period.
 
         Args:
             line_feeds: number of received line feeds.

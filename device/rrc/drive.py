@@ -23,9 +23,9 @@ _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
     """Count presses and releases of the speed and alarm buttons, and change the speed mode.
 
-    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So a button has changed
-    when the parity of its counter differs from its state. The counters change whether or not the
-    speed buttons are locked (DECISION R23).
+    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So a button was pressed
+    or released if the parity of its counter differs from the state of the button. The counters
+    change whether or not the speed buttons are locked (DECISION R23).
 
     Returns:
         True if the alarm button has just been pressed.

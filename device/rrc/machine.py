@@ -174,7 +174,7 @@ _STAYS: Final = ((Move.OUTPUT, RrcState.OUTPUT), (Move.LIMIT, RrcState.LIMIT))
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 @dataclass(slots=True)
 class Rrc(Copyable):
-    """An emulated RRC (Robotic Relay Communicator) with the VR2 wheelchair around it.
+    """An emulated RRC (Robotic Relay Communicator), which controls a VR2 wheelchair for a host.
 
     It is a `Device[bytes]`. If `config.vehicle` is set, the emulation includes the motion of the
     wheelchair. The numbers of this vehicle are our choice (vehicle.py).

@@ -77,12 +77,12 @@ class Vehicle:
             self.gauge, self.charge = gauge, gauge / _GAUGE_TOP
 
     def step(self, out_pct: tuple[int, int], speed_mode: int, *, running: bool) -> None:
-        """Move the vehicle for one period of 10 ms, and drain its battery.
+        """Move the wheelchair for one period of 10 ms, and drain its battery.
 
         Args:
             out_pct: translation and rotation for the motors.
             speed_mode: speed mode, 1..5.
-            running: whether VR2 is on. Otherwise the brakes are on.
+            running: whether the wheelchair control (VR2) is on. Otherwise the brakes are on.
         """
         v_pct, w_pct = out_pct if self.charge > 0.0 else (0, 0)
         top_mm_s = _TOP_MM_S[speed_mode - 1] * (_BACKING if v_pct < 0 else 1.0)

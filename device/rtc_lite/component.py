@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 class LitePort(Generic[T]):
-    """Base class of the in-ports and out-ports of an RTComponent-Lite.
+    """Base class of the in-ports and out-ports of a component on a small controller (RTC-Lite).
 
     Args:
         name: name of 1 to 15 printable ASCII characters.
@@ -74,7 +74,7 @@ class LiteInPort(LitePort[T]):
         return self.value
 
     def accept(self, data: bytes) -> bool:
-        """Store a value that the proxy has sent.
+        """Store a value that the proxy, which is the component's counterpart on the PC, has sent.
 
         Args:
             data: bytes of the value, as in the frame.

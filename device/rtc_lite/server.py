@@ -57,7 +57,7 @@ _BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
 
 @dataclass(slots=True)
 class LiteServer:
-    """Executes the requests that a proxy sends to an RTC-Lite node, and returns the answers.
+    """Executes the requests of a proxy on a PC in an RTC-Lite node, and returns the answers.
 
     The server has no clock. The node calls `execute` when the timer's period has ended.
 

@@ -276,8 +276,8 @@ class Plant(Part):
             limit_v: largest voltage of the power stage.
 
         Returns:
-            0 if the voltage is sufficient, or the sign of the limit that the voltage has reached:
-                -1 or 1.
+            0 if the voltage is sufficient. Otherwise the sign of the limit that the voltage has
+            reached, -1 or 1.
         """
         # Standstill is handled separately: winding alone, without back-EMF. The general step uses
         # one friction for the whole step; with it the shaft would end at speed 0, but its angle

@@ -107,7 +107,7 @@ def _span(rate: float, seconds: float) -> float:
 
 
 class I2t(Part):
-    """I2t protection of a power stage, which limits the time of more than the rated current.
+    """I2t protection of a power stage, which limits the time of currents above the continuous one.
 
     A budget of (peak^2 - continuous^2) * time fills with the square of the current above the
     continuous current, and drains when the current is below it. When the budget is full, only the
@@ -380,7 +380,7 @@ class ServoSettings(Copyable):
 
 
 class Readings(ServoSettings):
-    """Readings of a servo: position, speed, current, temperatures. It is a base class of `Servo`.
+    """Readings of a servo: position, speed, current and temperatures. `Servo` inherits them.
 
     Integers are measurements as the drive sees them. Floats are exact values for observers. The
     docstring of `Servo` describes the attributes.

@@ -138,10 +138,9 @@ class _Loops(Part):
 
 
 class Line(Part):
-    """The demanded positions of the next steps, on a straight line to a goal.
+    """Demanded positions on a straight line to a goal, for the next steps of `Servo.run_ahead`.
 
-    After the goal the demanded position stays there. `Servo.run_ahead` uses it to compute steps
-    ahead.
+    After the goal the demanded position stays at the goal.
 
     Attributes:
         position: present demanded position, in counts.

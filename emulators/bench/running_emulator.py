@@ -227,7 +227,7 @@ class Transcript:
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
         """Send data to the device as the host, and print the data at once.
 
-        They are printed even if the line is incomplete.
+        An incomplete line is printed, too.
 
         Args:
             now_us: present time.

@@ -24,7 +24,7 @@ class Filtering(Protocol):
     def accepts(self) -> Accepted:
         """The CAN-IDs that the device receives now, or None for all CAN-IDs.
 
-        They are None from power-on or a reset to the first tick.
+        The value is None from power-on or a reset to the first tick.
         """
         ...
 

@@ -125,7 +125,7 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
 
 
 def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
-    """Read a bus.yml, the file of ROS 2 that describes the nodes of a CANopen bus.
+    """Read a bus.yml, in which ros2_canopen and dcfgen describe the nodes of a CANopen bus.
 
     Args:
         file: path of the bus.yml.
@@ -245,8 +245,8 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
 def store_keeper(store: StoreFile) -> Callable[[int], None]:
     """Return a function that writes the store file if a node has stored something.
 
-    The emulator calls the function regularly with the time. If writing fails, the function logs one
-    warning and retries at later calls.
+    The emulator calls the function after each step. If writing fails, the function logs one warning
+    and retries at later calls.
     """
     failed = False
 

@@ -182,7 +182,7 @@ _START_ORDER: Final = (MOTOR, PALETTE)
 def set_up(network: canopen.Network) -> None:
     """Configure and start both nodes, so that the potentiometer controls the motor.
 
-    A master does this with SDOs. Afterwards no master is needed.
+    A master does this by SDO and NMT. Afterwards no master is needed.
 
     Raises:
         canopen.SdoCommunicationError: a node does not answer.

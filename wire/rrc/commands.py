@@ -116,7 +116,7 @@ class Command:
         """Return the line that sends this command, with its LF.
 
         Args:
-            check: whether to add the CHECK digit, which the mode `stablemode` requires.
+            check: whether to add the checksum digit CHECK, which the mode `stablemode` requires.
         """
         digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
         message = self.name + self.literal + b"".join(digits)
@@ -125,7 +125,9 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Limit(Command):
-    """RRC command `limit`: drive by the stick, but limit its translation v and rotation w.
+    """Command `limit` of an RRC wheelchair controller: drive by the stick, but with limits.
+
+    The limits apply to the translation v and the rotation w.
 
     Attributes:
         v_pct: parameter #1, translation input limit, 0..100 %.
@@ -179,7 +181,7 @@ class Date(Command):
 
 @dataclass(frozen=True, slots=True)
 class SpeedMode(Command):
-    """RRC command `speedmode`: choose the speed mode, from 1 (slowest) to 5.
+    """Command `speedmode` of an RRC wheelchair controller: choose the speed mode, 1 (slowest) to 5.
 
     `locked` = 1 locks the speed buttons of the wheelchair.
     """
@@ -244,7 +246,7 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return the settings that are valid after this command.
+        """Return the joystick settings that are valid after this command.
 
         A value of #8 to #10 that is out of range does not change the former value (DECISION R14).
 
@@ -265,7 +267,7 @@ class Joystick(Command):
 
 @dataclass(frozen=True, slots=True)
 class Watchdog(Command):
-    """RRC command `watchdog`: stop VR2 if no correct command arrives for a time.
+    """Command `watchdog` of an RRC: stop the wheelchair if no correct command arrives for a time.
 
     The time is 0..255 x 10 ms. 0 switches the watchdog off.
     """
@@ -288,9 +290,9 @@ class StableMode(Command):
 
 @dataclass(frozen=True, slots=True)
 class Status(Command):
-    """RRC command `status`: switch the periodic SA lines, which report the status, on or off.
+    """Command `status` of an RRC wheelchair controller: switch the periodic status lines on or off.
 
-    Type A is the only type of status line in version 1.0.
+    Type A (SA lines) is the only type of status line in version 1.0.
     """
 
     name = b"status"
@@ -309,9 +311,9 @@ class PowerOff(Command):
 
 @dataclass(frozen=True, slots=True)
 class Beep(Command):
-    """RRC command `beep`: sound the buzzer with five pairs of on and off times.
+    """Command `beep` of an RRC wheelchair controller: sound the buzzer in a given pattern.
 
-    Each time is 0..255 x 10 ms.
+    The pattern has five pairs of on and off times, 0..255 x 10 ms each.
     """
 
     name = b"beep"
@@ -336,10 +338,10 @@ _NAME: Final = re.compile(b"|".join(COMMANDS))  # no name is a prefix of another
 
 
 def parse_command(message: bytes) -> Command:
-    """Parse an RRC command.
+    """Parse a command line for an RRC wheelchair controller.
 
     Args:
-        message: line without its line end and without CHECK.
+        message: line without its line end and without its checksum digit CHECK.
 
     Raises:
         UnknownCommand: the name is unknown. Names are lower case.

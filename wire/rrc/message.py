@@ -59,9 +59,7 @@ def check_digit(message: bytes) -> bytes:
 
 
 def strip_check(line: bytes) -> bytes:
-    """Verify the CHECK digit at the end of an RRC line, and return the line without it.
-
-    CHECK is the checksum of the line.
+    """Verify the checksum digit CHECK at the end of an RRC line, and return the line without it.
 
     Raises:
         ChecksumError: CHECK is missing, wrong or not a hex digit.
@@ -102,9 +100,10 @@ PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
 
 
 def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
-    """Return the number of lines per second that a host may send to an RRC while VR2 runs.
+    """Return the number of lines per second that a host may send to an RRC wheelchair controller.
 
-    The RRC would stop VR2 if it could not keep up with more lines.
+    The number applies while the wheelchair (VR2) runs. If the RRC receives more lines than it can
+    process, it stops the wheelchair.
 
     Args:
         stable: whether OK lines are omitted (stablemode).

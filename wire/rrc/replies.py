@@ -59,7 +59,7 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """RRC reply `ER:reason`: a command was refused.
+    """Reply `ER:reason` of an RRC wheelchair controller: a command was refused.
 
     The reason is the name of the command, or a fault of the line.
     """
@@ -73,9 +73,10 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """RRC line `EV:name`: the state of the RRC or of VR2 has changed.
+    """Line `EV:name` of an RRC wheelchair controller: a state has changed.
 
-    Newer firmware may send names that the manual does not list.
+    It is the state of the RRC or of the wheelchair (VR2). Newer firmware may send names that the
+    manual does not list.
     """
 
     name: str
@@ -132,7 +133,9 @@ class StatusA:
         speed_mode: int,
         counts: tuple[int, int, int],
     ) -> bytes:
-        r"""Return the SA line (status line) of an RRC with the given values, with its CHECK and LF.
+        r"""Return the status line (SA) of an RRC wheelchair controller with the given values.
+
+        It ends with the checksum digit CHECK and LF.
 
         Args:
             stick_pct: translation and rotation of the stick, #1 and #2.
@@ -165,7 +168,7 @@ class StatusA:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Any other line of an RRC: an answer to `device`, `version` or `date`.
+    """Any other line of an RRC wheelchair controller: the answer to `device`, `version` or `date`.
 
     A line of newer firmware that is unknown here is also a `Text`.
     """
@@ -187,7 +190,7 @@ _BY_PREFIX: Final[dict[bytes, type[Ok] | type[Refusal] | type[Event]]] = {
 
 
 def parse_reply(line: bytes) -> Reply:
-    """Parse a line that an RRC has sent, without its LF.
+    """Parse a line that an RRC wheelchair controller has sent, without its LF.
 
     Raises:
         FramingError: an SA line has a wrong length.

@@ -138,7 +138,7 @@ class Checksum(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LiteFrame:
-    """A frame of RTC-Lite between a proxy and a device: a command and its data.
+    """A frame of RTC-Lite between a small controller and its proxy on a PC: a command and its data.
 
     Attributes:
         command: command bytes Cmnd0 and Cmnd1.
@@ -179,7 +179,7 @@ class LiteDecoder:
     byte if a frame has `begun`, or after 20 ms without a byte if the decoder is `lost`.
 
     Args:
-        layouts: layouts of the frames: `REQUESTS` at the device, `REPLIES` at the proxy.
+        layouts: layouts of the frames: `REQUESTS` at the device, `REPLIES` at its proxy on the PC.
         checksum: algorithm of the checksum.
 
     Attributes:

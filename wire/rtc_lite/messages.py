@@ -22,7 +22,7 @@ PORT_COUNTS_BYTES: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class LitePortData:
-    """Data of the frame that sends a value to an in-port (PS) or from an out-port (QV).
+    """Data of the RTC-Lite frame that sends a value to an in-port (PS) or from an out-port (QV).
 
     Attributes:
         name: name of the port, as on the wire.
@@ -45,7 +45,7 @@ class LitePortData:
 
 @dataclass(frozen=True, slots=True)
 class LitePortProfile:
-    """Data of the frame with which a device describes one of its ports.
+    """Data of the RTC-Lite frame with which a device describes one of its ports.
 
     The frame is PP for an in-port and QQ for an out-port.
 
@@ -64,11 +64,13 @@ class LitePortProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteComponentProfile:
-    """Data of the reply (CZ) that ends a component's profile, after a frame for each port.
+    """Data of the RTC-Lite reply (CZ) that ends the description of a component.
+
+    Before it the device has sent a frame for each port.
 
     Attributes:
-        in_ports: number of PP frames that were sent.
-        out_ports: number of QQ frames that were sent.
+        in_ports: number of PP frames that were sent, one for each in-port.
+        out_ports: number of QQ frames that were sent, one for each out-port.
         type_name: type of the component.
     """
 
@@ -104,7 +106,7 @@ class LiteReply:
 
 
 def parse_port_data(data: bytes) -> LitePortData:
-    """Parse the data of a frame that sends the value of a port (PS or QV).
+    """Parse the data of an RTC-Lite frame that sends the value of a port (PS or QV).
 
     Raises:
         FramingError: the lengths of name and value do not match the frame.
@@ -117,7 +119,7 @@ def parse_port_data(data: bytes) -> LitePortData:
 
 
 def parse_port_profile(data: bytes) -> LitePortProfile:
-    """Parse the data of a frame that describes a port (PP or QQ).
+    """Parse the data of an RTC-Lite frame that describes a port (PP or QQ).
 
     Raises:
         FramingError: the length of the name does not match the frame.
@@ -128,7 +130,7 @@ def parse_port_profile(data: bytes) -> LitePortProfile:
 
 
 def parse_component_profile(fields: bytes) -> LiteComponentProfile:
-    """Parse the fields of the reply that ends a component's profile (CZ).
+    """Parse the fields of the RTC-Lite reply that ends the description of a component (CZ).
 
     Raises:
         FramingError: the length of the name does not match the fields.

@@ -66,7 +66,7 @@ _STATES: Final = {
 
 
 def encode_request(frame: LiteFrame) -> bytes:
-    """Return an RTC-Lite request of the proxy as a packet of RTno.
+    """Return an RTC-Lite request as a packet of RTno, a similar protocol for small controllers.
 
     Raises:
         KeyError: RTno has no letter for the request.
@@ -75,7 +75,7 @@ def encode_request(frame: LiteFrame) -> bytes:
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Return an RTC-Lite frame of the device as a packet of RTno.
+    """Return an RTC-Lite frame of a device as a packet of RTno.
 
     Raises:
         KeyError: RTno has no letter for the frame.
@@ -188,7 +188,7 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 
 @dataclass(slots=True)
 class RtnoReplies(RtnoPacketDecoder):
-    r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy.
+    r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy on a PC.
 
     It is used like `LiteDecoder(REPLIES)`. RTno omits parts of a frame: the status of a state, the
     state after a command, the numbers and the type of a profile. This decoder adds the omitted

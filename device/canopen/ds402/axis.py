@@ -394,9 +394,8 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 class Switches(Part):
     """The limit switches and the home switch of an axis, as the drive reads them.
 
-    A switch is pressed by a physical input ("by hand"), or by the shaft while it is within a range
-    of angles. Negative and positive are the directions of the user, after the polarity 607Eh is
-    applied.
+    A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. Negative
+    and positive are the directions of the user, after the polarity 607Eh is applied.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.

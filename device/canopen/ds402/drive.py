@@ -240,7 +240,7 @@ class Ds402(Application):
     def goes_on_plainly(self) -> bool:
         """Whether the next ticks only continue the motion of the mode of operation.
 
-        Then several ticks can be computed at once. It is False while an input has changed, a
+        Several ticks can then be computed at once. The value is false if an input has changed, a
         time-out runs, a watcher needs each value, or a limit switch could act.
         """
         changes = self._stale or self.inputs.changed or self.actual_values.watched

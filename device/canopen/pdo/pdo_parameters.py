@@ -272,8 +272,7 @@ class EventDriven(TpdoMode):
     """Transmission types 254 and 255: the TPDO is sent on an event and by the event timer.
 
     It is also sent at the start. After a transmission the next one waits until the inhibit time has
-    passed. The TPDO then
-    contains the newest data.
+    passed. The TPDO then contains the newest data.
     """
 
     timed: ClassVar[bool] = True

@@ -37,10 +37,10 @@ class CanBridge:
         return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
-        """Send the frames that have come from outside since the last poll on the emulated bus.
+        """Send frames that have come from outside since the last poll on the emulated bus.
 
-        They may have been sent at any time since the last poll. They count as sent right after the
-        last poll, so a host loses no tick by the polling.
+        The frames may have been sent at any time since the last poll. They count as sent right
+        after the last poll, so a host loses no tick by the polling.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)

@@ -100,7 +100,7 @@ class CanHost:
         return own
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
-        """Send frames periodically: one now, and the next one in each period, in turn.
+        """Send frames periodically: one frame now and one in each period, in turn.
 
         The frames are sent whenever any code advances the rig's time.
 

@@ -324,7 +324,7 @@ def read_bus(
 ) -> BusNodes:
     """Read a bus.yml and the files it names, and describe its slaves.
 
-    The result is read again only if one of the files has changed.
+    A cached result is returned if none of the files has changed.
 
     Args:
         path: path of the bus.yml.
@@ -352,7 +352,7 @@ def read_bus(
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     """Check a bus.yml for errors that prevent its slaves from being emulated.
 
-    `BusFile` itself does not find these errors: those in `tickrig:`, in the robot, and others.
+    These are errors that `BusFile` does not find, such as errors in `tickrig:` or in the robot.
 
     Args:
         bus: content of the file. Without slaves there is nothing to check.

@@ -73,7 +73,8 @@ class Finding(NamedTuple):
 def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
     """Yield errors and warnings about EDS files as lines of text.
 
-    If many sections of a file have the same finding, there is one line with their number.
+    If several sections of a file have the same finding, there is one line, with the number of the
+    others.
     """
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):

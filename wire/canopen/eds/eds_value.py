@@ -283,9 +283,9 @@ def parse_number(text: str) -> int:
 
 
 def is_plain_number(text: str) -> bool:
-    """Return whether a text is already a number in CiA 306 notation, or empty.
+    """Return whether a text is already a number in CiA 306 notation, or is empty.
 
-    This is a fast check, because nearly all numbers of EDS files are.
+    Nearly all numbers in EDS files have this notation, so this fast check saves their conversion.
     """
     return _PLAIN.fullmatch(text) is not None
 

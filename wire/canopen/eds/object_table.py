@@ -380,7 +380,7 @@ _MAPPED: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
-    """Values of the communication objects (1000h..1FFFh) in which one device differs from another.
+    """Values of the communication objects (1000h..1FFFh) that a device does not share with others.
 
     Attributes:
         device_type: value of 1000h.
