@@ -34,11 +34,6 @@ _TOGGLE: Final = 0x80
 _STATES: Final = frozenset(map(int, nmt.NmtState))
 _COMMANDS: Final = frozenset(map(int, nmt.NmtCommand))
 _RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
-_TARGETS: Final = {
-    int(nmt.NmtCommand.START): int(nmt.NmtState.OPERATIONAL),
-    int(nmt.NmtCommand.STOP): int(nmt.NmtState.STOPPED),
-    int(nmt.NmtCommand.ENTER_PRE_OPERATIONAL): int(nmt.NmtState.PRE_OPERATIONAL),
-}
 _ANSWER_US: Final = 50_000
 """Longest time from a remote frame to the error control frame that answers it."""
 _PATIENCE_US: Final = 1_000_000
@@ -268,7 +263,7 @@ class BusEvents:
             if command in _RESETS:
                 one.reset, one.command = True, None
             else:
-                one.command, one.told_since = (at_us, _TARGETS[command], self._row), 0
+                one.command, one.told_since = (at_us, nmt.COMMANDED[command], self._row), 0
 
     def _error_control(self, at_us: int, node: int, data: bytes, *, remote: bool) -> None:
         one = self.nodes[node]

@@ -46,7 +46,7 @@ from tickrig.host.canmon.model.frames import Record, Stamp, ident_of, sender_of,
 from tickrig.host.text.page_text import json_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import describe
-from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.nmt import COMMANDED, NmtState
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 
 # All nodes at a glance: states, heartbeats, boot-ups, EMCYs, SDO errors, drives.
@@ -55,14 +55,6 @@ _EMCY_KEPT: Final = 16
 _BEATS_KEPT: Final = 12
 _DEVICE_NAME: Final = (0x1008, 0)
 _FROM_EDS: Final = " (EDS)"
-
-_TARGETS: Final = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
-    NmtCommand.RESET_NODE: NmtState.INITIALISING,
-    NmtCommand.RESET_COMMUNICATION: NmtState.INITIALISING,
-}
 
 
 class _EmcyRecord(NamedTuple):
@@ -172,9 +164,8 @@ class NodeStatus:
 
     def command(self, specifier: int) -> None:
         """Process an NMT command to the node."""
-        target = _TARGETS[NmtCommand(specifier)]
-        self.commanded = target
-        self._reset_requested = target is NmtState.INITIALISING
+        self.commanded = COMMANDED.get(specifier, NmtState.INITIALISING)
+        self._reset_requested = self.commanded is NmtState.INITIALISING
 
     def boot(self, at_us: int) -> None:
         """Process a boot-up. The node is then pre-operational (CiA 301, boot-up)."""
