@@ -549,8 +549,8 @@ class _BusJudge:
 
     def _pieces(self, ident: int, rows: Sequence[int]) -> list[Sequence[int]]:
         """Split the rows of an identifier where the rhythm of its frames changes on purpose."""
-        times = _plain_times(self._times, rows)
-        places = {bisect_right(times, cut) for cut in self._cuts_of(ident)}
+        time_of = self._times.__getitem__
+        places = {bisect_right(rows, cut, key=time_of) for cut in self._cuts_of(ident)}
         ends = sorted({0, len(rows), *places})
         return [rows[begin:end] for begin, end in pairwise(ends)]
 
@@ -909,23 +909,6 @@ def _plain(values: Any) -> list[int]:
         return values
     found: list[int] = values.tolist() if hasattr(values, "tolist") else list(values)
     return found
-
-
-def _plain_times(times: Sequence[int], rows: Sequence[int]) -> _TimesOf:
-    return _TimesOf(times, rows)
-
-
-class _TimesOf(Sequence[int]):
-    """The times of some rows, which are looked up when needed."""
-
-    def __init__(self, times: Sequence[int], rows: Sequence[int]) -> None:
-        self._times, self._rows = times, rows
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __getitem__(self, at: Any) -> Any:
-        return self._times[self._rows[at]]
 
 
 def _has_rhythm(ident: int) -> bool:
