@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -100,6 +100,16 @@ _TIMED: Final = (
     *(f"sync-{what}" for what in ("missing", "doubled", "period")),
 )
 """Rules that a log without times cannot violate."""
+_LENGTHS: Final[Sequence[tuple[Collection[int], tuple[int, ...]]]] = (
+    ((nmt.NMT_COB_ID,), (2,)),
+    ((node_events.SYNC_ID,), (0, 1)),
+    ((node_events.TIME_ID,), (6,)),
+    (node_events.EMCY_IDS, (8,)),
+    (node_events.RESPONSE_IDS, (sdo_frame.FRAME_BYTES,)),
+    (node_events.REQUEST_IDS, (sdo_frame.FRAME_BYTES,)),
+    (node_events.ERROR_CONTROL_IDS, (1,)),
+)
+"""Valid numbers of data bytes of services, by CAN-ID."""
 _SURE_SHARE: Final = 0.9
 """Share of gaps with a period from which this period can be learnt."""
 _NEAR_US: Final = 100_000
@@ -439,17 +449,6 @@ class _BusJudge:
     # Lengths
 
     def _lengths(self, decoder: Decoder) -> None:
-        right = {
-            nmt.NMT_COB_ID: (2,),
-            node_events.SYNC_ID: (0, 1),
-            node_events.TIME_ID: (6,),
-        }
-        groups = (
-            (node_events.EMCY_IDS, (8,)),
-            (node_events.RESPONSE_IDS, (sdo_frame.FRAME_BYTES,)),
-            (node_events.REQUEST_IDS, (sdo_frame.FRAME_BYTES,)),
-            (node_events.ERROR_CONTROL_IDS, (1,)),
-        )
         for ident, rows in self._rows.items():
             if ident > STANDARD_MAX:
                 continue
@@ -457,7 +456,7 @@ class _BusJudge:
             if ident in node_events.PDO_IDS:
                 self._pdo_length(ident, rows, sizes, decoder)
                 continue
-            fits = right.get(ident) or next((one for ids, one in groups if ident in ids), None)
+            fits = next((right for idents, right in _LENGTHS if ident in idents), None)
             if fits is None:
                 continue
             for size in sizes.keys() - set(fits):
