@@ -34,7 +34,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -341,7 +341,8 @@ class _BusJudge:
             for ident, found in self._rows.items()
             if (node_events.is_event(ident) if self._canopen else ident & ERROR and ident < FD)
         ]
-        for row in _merged(parts) if but is None else _rows_but(parts, but):
+        rows = chain.from_iterable(map(_plain, parts))
+        for row in sorted(rows) if but is None else _rows_but(parts, but):
             events.take(int(row))
         return events
 
@@ -611,7 +612,9 @@ class _BusJudge:
     def _heartbeats(self, node: int, one: node_events.NodeEvents) -> None:
         ident = nmt.ERROR_CONTROL_COB_ID + node
         rows = [row for row in one.heartbeats if self._bus.dlc[row] > 0]
-        if self._two_beats(ident, rows, [self._times[row] for row in rows]):
+        found = node_memory.two_beats([self._times[row] for row in rows])
+        if found is not None:  # every second frame keeps the period
+            self._double(ident, [rows[at + 1] for at in found.places])
             return
         pieces = self._pieces(ident, rows)
         for piece in pieces:
@@ -659,13 +662,6 @@ class _BusJudge:
     def _lost(self, ident: int, gap: int, says: str, rows: Sequence[int], n: int) -> None:
         text = f"no heartbeat for {ms_text(gap)} ms, {says}"
         self._hit("no-lost-heartbeat", ident, text, rows, n)
-
-    def _two_beats(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
-        """Report two interleaved heartbeats, of which every second frame keeps the period."""
-        found = node_memory.two_beats(times)
-        if found is not None:
-            self._double(ident, [rows[at + 1] for at in found.places])
-        return found is not None
 
     def _double(self, ident: int, rows: Sequence[int]) -> None:
         text = "a second heartbeat comes beside the first: two nodes have this node-ID"
@@ -750,9 +746,7 @@ class _BusJudge:
         for ident, rows in sorted(self._rows.items()):
             if len(rows) != 1 or ident & (ERROR | REMOTE) or ident >= FD:
                 continue
-            if node_events.is_event(ident) or ident in node_events.LSS_IDS:
-                continue
-            if ident == node_events.TIME_ID:
+            if node_events.is_event(ident) or ident in (*node_events.LSS_IDS, node_events.TIME_ID):
                 continue
             at_us = times[rows[0]]
             node = node_of(ident)
@@ -760,13 +754,8 @@ class _BusJudge:
             started = at > 0 and at_us - starts[at - 1] < _SOON_US
             if ident in node_events.PDO_IDS and node in heard and started:
                 continue
-            name = _name(ident) if node in heard else ident_text(ident)
-            self._hits.append(
-                Hit(
-                    *("seen-once", node if node in heard else None, ident),
-                    *(f"{name} comes once", tuple(rows)),
-                )
-            )
+            node, name = (node, _name(ident)) if node in heard else (None, ident_text(ident))
+            self._hits.append(Hit("seen-once", node, ident, f"{name} comes once", tuple(rows)))
 
     # The usual traffic
 
@@ -876,14 +865,6 @@ class _BusJudge:
             sum(hit.amount for hit in hits),
             tuple(self._bus.place(row) for row in rows[: learnt.KEPT_FRAMES]),
         )
-
-
-def _merged(parts: Iterable[Sequence[int]]) -> list[int]:
-    rows: list[int] = []
-    for part in parts:
-        rows += _plain(part)
-    rows.sort()
-    return rows
 
 
 def _rows_but(parts: Iterable[Any], but: Any) -> Any:
