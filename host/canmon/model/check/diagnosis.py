@@ -262,24 +262,6 @@ class Diagnoser:
         return found
 
 
-def diagnose(
-    frames: Iterable[Columns | Sequence[Record]],
-    bit_rate: int | None = None,
-    eds: Mapping[int, node_memory.EdsObjects] = _NO_NODES,
-) -> Diagnosis:
-    """Judge the frames of a log by all rules that need no parameter.
-
-    Args:
-        frames: blocks of frames in the order of the log. Each block is columns or records.
-        bit_rate: bit rate in bits per second, used for the load, or None if unknown.
-        eds: content of EDS files by node-ID.
-    """
-    one = Diagnoser(bit_rate, eds)
-    for block in frames:
-        one.take(block)
-    return one.diagnosis()
-
-
 class _BusJudge:
     """Judge of one bus."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 from random import Random
@@ -22,9 +23,18 @@ from tests.host.canmon.model.check.sound_log import (
     without,
 )
 from tickrig.host.canmon.model.check import bus_frames, cycles, learnt
-from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, diagnose
+from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, Diagnosis
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
+
+
+def diagnose(blocks: Iterable[Sequence[Record]], bit_rate: int | None = None) -> Diagnosis:
+    """Judge the frames of a log."""
+    one = Diagnoser(bit_rate)
+    for block in blocks:
+        one.take(block)
+    return one.diagnosis()
+
 
 PLANS = {
     "usual": Plan(),
