@@ -94,7 +94,6 @@ _NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
 _IDENTITY: Final = 0x1018
-_LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
 TEACHING: Final = frozenset(
     {
         *(node_memory.DEVICE_TYPE[0], node_memory.HEARTBEAT_TIME[0], node_memory.STORE, _IDENTITY),
@@ -106,6 +105,8 @@ _PRE_DEFINED: Final[dict[int, Route]] = {
     NMT_COB_ID: services.decode_nmt,
     _SYNC_ID: services.decode_sync,
     _TIME_ID: services.decode_time,
+    LSS_MASTER_COB_ID: services.decode_lss,
+    LSS_SLAVE_COB_ID: services.decode_lss,
 }
 
 
@@ -184,16 +185,8 @@ class BusDecoder:
         """
         route = self._routed(can_id)
         told = route.func if isinstance(route, partial) else route
-        by_frame = told in (
-            _unmapped,
-            _emcy,
-            _raw,
-            services.decode_nmt,
-            services.decode_sync,
-            services.decode_time,
-        )
-        alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
-        return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
+        mapped = isinstance(getattr(route, "__self__", None), PdoDecoder)
+        return route if mapped or told in (_unmapped, _emcy, _raw, *_PRE_DEFINED.values()) else None
 
     @property
     def version(self) -> int:
@@ -258,8 +251,6 @@ class BusDecoder:
         told = self._configured.get(can_id) or _PRE_DEFINED.get(can_id)
         if told is not None:
             return told
-        if can_id in _LSS_IDS:
-            return _lss_route()
         layout = self._pdos.layout(can_id)
         if layout is not None:
             return layout.decode
@@ -419,12 +410,6 @@ def _signals(transfer: Transfer) -> tuple[Signal, ...]:
         return ()
     name = transfer.name or write_entry(transfer.entry)
     return (Signal(name, transfer.value, transfer.unit, transfer.text),)
-
-
-def _lss_route() -> Route:
-    from tickrig.host.canmon.model.decode.services import decode_lss  # noqa: PLC0415 - on few buses
-
-    return decode_lss
 
 
 def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
