@@ -319,6 +319,9 @@ class NodeMemory:
     Args:
         eds: content of the node's EDS file. The power-on values are valid until traffic shows other
             values.
+
+    Attributes:
+        has_statusword: whether 16 bits of 6041h were seen, in SDO or as mapped to a PDO.
     """
 
     def __init__(self, eds: EdsObjects | None = None) -> None:
@@ -326,7 +329,7 @@ class NodeMemory:
         self._power_on: dict[Entry, bytes] = {}
         self._now: dict[Entry, bytes] = {}
         self._written: set[Entry] = set()
-        self._has_statusword = False
+        self.has_statusword = False
 
     def read(self, entry: Entry, data: bytes) -> None:
         """Store a value that was uploaded."""
@@ -350,7 +353,7 @@ class NodeMemory:
         if entry[0] in _COMMUNICATION:
             self._now[entry] = data
         elif entry == STATUSWORD and len(data) == _STATUSWORD_BYTES:
-            self._has_statusword = True
+            self.has_statusword = True
 
     def learn(self, transfer: decoded.Transfer) -> bool:
         """Store the value of a transfer that ended. Return False if it has no usable value."""
@@ -400,18 +403,9 @@ class NodeMemory:
         return decoded.EDS if any(entry in self.eds.values for entry in entries) else ""
 
     @property
-    def has_statusword(self) -> bool:
-        """Whether 16 bits of 6041h were seen."""
-        return self._has_statusword
-
-    @property
     def boots_otherwise(self) -> bool:
         """Whether a boot-up may change any value."""
         return bool(self._written) or self._now != self._power_on
-
-    def maps_statusword(self) -> None:
-        """Record that a PDO carries 16 bits of 6041h."""
-        self._has_statusword = True
 
     @property
     def is_drive(self) -> bool:
@@ -424,7 +418,7 @@ class NodeMemory:
         # 1000h: profile in the low half; FFFFh above it stands for several of them (CiA
         # 301).
         if device_type is None or device_type >> 16 == _SEVERAL_PROFILES:
-            return self._has_statusword
+            return self.has_statusword
         return device_type & 0xFFFF == _DRIVE_PROFILE
 
     def describe(self, index: int, sub: int) -> ObjectText:

@@ -261,7 +261,7 @@ def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
         return _MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
     entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
     if (STATUSWORD, 16) in {((item.index, item.sub), item.bits) for item in entries}:
-        memory.maps_statusword()
+        memory.has_statusword = True
     missing = f"and {mapping:04X}h:{len(entries) + 1:02X}, which is unknown"
     note = missing if len(entries) < count else ""
     bits = sum(item.bits for item in entries)
