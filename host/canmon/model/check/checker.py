@@ -65,7 +65,98 @@ if TYPE_CHECKING:
 # Text of findings is read by people and by tests, and is the same for both ways.
 
 
-class Checker:
+class Unjudged(NamedTuple):
+    """Rules that could not be judged.
+
+    Attributes:
+        rules: reason for each rule that judged nothing, by name of the rule.
+        notes: notes on rules that could be judged only in part.
+    """
+
+    rules: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+
+
+class RuleCheck:
+    """Base class of checks of rules: what they report at the end of the traffic.
+
+    Args:
+        rules: rules to check.
+        bit_rate: bit rate in bits per second, used for the load.
+        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+
+    Raises:
+        ValueError: there is a limit of the load, but no bit rate.
+    """
+
+    def __init__(self, rules: Rules, bit_rate: int | None, eds_heartbeats: EdsHeartbeats) -> None:
+        self._rules, self._made = rules, rules.make(eds_heartbeats)
+        self._load, self._begun = rules.load(bit_rate), False
+
+    def _begin(self, at_us: int) -> None:
+        self._begun = True
+        for rule in self._made:
+            rule.begin(at_us)
+
+    def _evidence(self) -> Mapping[tuple[str, int], Seen]:
+        """Return the frames of each identifier on each bus."""
+        raise NotImplementedError
+
+    def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
+        """Return the violation of the load limit in a second of a bus, if there is one."""
+        text = self._load.judge(channel, window) if self._load else None
+        return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
+
+    def _ended(
+        self,
+        loads: Mapping[str, Load],
+        end_us: int,
+        lost: Iterable[str] = (),
+        errors: Iterable[str] = (),
+    ) -> list[TrafficFinding]:
+        """Return the violations at the end: open seconds, missing frames, reports of the source."""
+        found = []
+        for channel, load in sorted(loads.items()):
+            found += self.judge_window(channel, load.end())
+        latest_us: dict[int, int] = {}
+        for (_, ident), seen in self._evidence().items():
+            latest_us[ident] = max(seen.last_us, latest_us.get(ident, seen.last_us))
+        found += [
+            TrafficFinding(end_us, rule.name, text)
+            for rule in self._made
+            for text in rule.end(latest_us, end_us)
+        ]
+        if self._rules.no_error_frames:
+            found += [TrafficFinding(end_us, NoErrorFrames.name, text) for text in errors]
+        return found + [
+            TrafficFinding(end_us, NO_LOSS, text) for text in lost if self._rules.no_loss
+        ]
+
+    def _unjudged(
+        self, end_us: int, without_errors: str, written: Iterable[ExpressionRule] = ()
+    ) -> Unjudged:
+        """Return the rules that were not judged, for a source that had a frame."""
+        evidence = CheckedTraffic(self._evidence(), end_us, without_errors)
+        why = [(rule.name, rule.unjudged(evidence)) for rule in self._made]
+        why += [(rule.name, rule.unjudged(evidence)) for rule in written]
+        if self._rules.max_load is not None:
+            no_load = "no frame came" if not evidence.seen else ONE_TIME * evidence.untimed
+            why.append((MaxLoad.name, no_load))
+        by_name: dict[str, list[str]] = {}
+        for name, reason in why:
+            by_name.setdefault(name, []).append(reason)
+        none = {name: "; ".join(dict.fromkeys(said)) for name, said in by_name.items() if all(said)}
+        notes = [
+            f"{rule.name}: {text}"
+            for rule in self._made
+            if rule.name not in none
+            for text in rule.notes(evidence)
+        ]
+        notes += [f"{name}: {text}" for name, text in why if text and name not in none]
+        return Unjudged(none, tuple(notes))
+
+
+class Checker(RuleCheck):
     """Checker that applies rules to frames.
 
     The memory of the checker grows with the number of identifiers, not with the number of frames.
@@ -88,11 +179,9 @@ class Checker:
         data_bit_rate: int | None = None,
         eds_heartbeats: EdsHeartbeats = NO_EDS,
     ) -> None:
-        self._rules, self._made = rules, rules.make(eds_heartbeats)
-        self._load = rules.load(bit_rate)
+        super().__init__(rules, bit_rate, eds_heartbeats)
         self._wanting: dict[int, list[Rule]] = {}
         self._seen: dict[tuple[str, int], list[int]] = {}  # first and last time, and how many
-        self._begun = False
         self._loads: dict[str, Load] = {}
         self._expressions = [rule for one in rules.expressions for rule in one.make()]
         self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
@@ -121,9 +210,7 @@ class Checker:
     def _taken(self, record: Record) -> list[TrafficFinding]:
         at_us, channel, frame, _ = record
         if not self._begun:
-            self._begun = True
-            for rule in self._made:
-                rule.begin(at_us)
+            self._begin(at_us)
         found = self._too_busy(at_us, channel, frame) if self._load else []
         if isinstance(frame, ErrorFrame):
             return found + self._judged(ERROR, record, None)
@@ -153,16 +240,13 @@ class Checker:
             judged_us: time up to which expressions are judged, or None for `end_us`.
             errors: report of the source about errors in addition to its error frames.
         """
-        windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
-        found = [one for channel, window in windows for one in self.judge_window(channel, window)]
-        found += ended(self._rules, self._made, self._latest(), end_us, lost, errors)
+        found = self._ended(self._loads, end_us, lost, errors)
         judged_us = end_us if judged_us is None else judged_us
         return found + self.advance(judged_us) + self._written_ended(judged_us)
 
     def missing(self, now_us: int) -> list[TrafficFinding]:
         """Return findings about frames that are missing now. The check continues."""
-        found = ended(self._rules, self._made, self._latest(), now_us, (), ())
-        return found + self._written_ended(now_us)
+        return self._ended({}, now_us) + self._written_ended(now_us)
 
     def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
         """Return the rules that could not be judged up to a time.
@@ -171,23 +255,13 @@ class Checker:
             end_us: time when listening ended.
             without_errors: reason why the source cannot contain error frames.
         """
-        seen = {key: Seen(*values) for key, values in self._seen.items()}
-        evidence = CheckedTraffic(seen, end_us, without_errors)
-        return unjudged(self._rules, self._made, evidence, self._expressions)
+        return self._unjudged(end_us, without_errors, self._expressions)
 
-    def _latest(self) -> dict[int, int]:
-        latest: dict[int, int] = {}
-        for (_, ident), (_, at_us, _) in self._seen.items():
-            latest[ident] = max(at_us, latest.get(ident, at_us))
-        return latest
+    def _evidence(self) -> Mapping[tuple[str, int], Seen]:
+        return {key: Seen(*values) for key, values in self._seen.items()}
 
     def _written_ended(self, end_us: int) -> list[TrafficFinding]:
         return [one for rule in self._expressions for one in rule.end(end_us)]
-
-    def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
-        """Return the violation of the load limit in a second of a bus, if there is one."""
-        text = self._load.judge(channel, window) if self._load else None
-        return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
 
     def _judged(self, ident: int, record: Record, gap_us: int | None) -> list[TrafficFinding]:
         wanting = self._wanting.get(ident)
@@ -205,63 +279,6 @@ class Checker:
         bits = self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
         window = load.take(at_us, bits)
         return [] if window is None else self.judge_window(channel, window)
-
-
-def ended(  # noqa: PLR0913, PLR0917 - all that there is at the end
-    rules: Rules,
-    made: Iterable[Rule],
-    latest_us: dict[int, int],
-    end_us: int,
-    lost: Iterable[str],
-    errors: Iterable[str],
-) -> list[TrafficFinding]:
-    """Return the violations at the end: missing frames, and reports of the source."""
-    found = [
-        TrafficFinding(end_us, rule.name, text)
-        for rule in made
-        for text in rule.end(latest_us, end_us)
-    ]
-    if rules.no_error_frames:
-        found += [TrafficFinding(end_us, NoErrorFrames.name, text) for text in errors]
-    return found + [TrafficFinding(end_us, NO_LOSS, text) for text in lost if rules.no_loss]
-
-
-class Unjudged(NamedTuple):
-    """Rules that could not be judged.
-
-    Attributes:
-        rules: reason for each rule that judged nothing, by name of the rule.
-        notes: notes on rules that could be judged only in part.
-    """
-
-    rules: Mapping[str, str]
-    notes: tuple[str, ...] = ()
-
-
-def unjudged(
-    rules: Rules,
-    made: Iterable[Rule],
-    evidence: CheckedTraffic,
-    written: Iterable[ExpressionRule] = (),
-) -> Unjudged:
-    """Return the rules that were not judged, for a source that had a frame."""
-    why = [(rule.name, rule.unjudged(evidence)) for rule in made]
-    why += [(rule.name, rule.unjudged(evidence)) for rule in written]
-    if rules.max_load is not None:
-        no_load = "no frame came" if not evidence.seen else ONE_TIME * evidence.untimed
-        why.append((MaxLoad.name, no_load))
-    by_name: dict[str, list[str]] = {}
-    for name, reason in why:
-        by_name.setdefault(name, []).append(reason)
-    none = {name: "; ".join(dict.fromkeys(said)) for name, said in by_name.items() if all(said)}
-    notes = [
-        f"{rule.name}: {text}"
-        for rule in made
-        if rule.name not in none
-        for text in rule.notes(evidence)
-    ]
-    notes += [f"{name}: {text}" for name, text in why if text and name not in none]
-    return Unjudged(none, tuple(notes))
 
 
 # A checker that decodes frames if a rule needs decoded frames.

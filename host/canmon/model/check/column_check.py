@@ -5,19 +5,17 @@ The module needs numpy.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import starmap
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.check.checker import Unjudged, ended, unjudged
+from tickrig.host.canmon.model.check.checker import RuleCheck, Unjudged
 from tickrig.host.canmon.model.check.rule import (
     NO_GAP_US,
-    CheckedTraffic,
     FrameSelection,
-    MaxLoad,
     Rule,
     Seen,
     TrafficFinding,
@@ -45,7 +43,7 @@ _Placed = tuple[int, int, TrafficFinding]
 """A finding with its row, and its place among findings of the row, in the order of `Checker`."""
 
 
-class ColumnChecker:
+class ColumnChecker(RuleCheck):
     """Checker of blocks of frames. It finds what `Checker` finds frame by frame.
 
     The memory of the checker grows with the number of identifiers, not with the number of frames.
@@ -62,24 +60,21 @@ class ColumnChecker:
     def __init__(
         self, rules: Rules, bit_rate: int | None = None, eds_heartbeats: EdsHeartbeats = NO_EDS
     ) -> None:
-        self._rules, self._made = rules, rules.make(eds_heartbeats)
-        self._limit = rules.load(bit_rate)
+        super().__init__(rules, bit_rate, eds_heartbeats)
         self._wanting: dict[int, list[tuple[int, Rule]]] = {}
         self._selections: dict[str, _BusSelection] = {}
         self._loads: dict[str, ColumnLoad] = {}
-        self._last_us, self._begun = 0, False
+        self._last_us = 0
 
     def take(self, columns: Columns) -> list[TrafficFinding]:
         """Check a block of frames, and the seconds that it completed. Return the violations."""
         if len(columns) and not self._begun:
-            self._begun = True
-            for rule in self._made:
-                rule.begin(int(columns.at_us[0]))
+            self._begin(int(columns.at_us[0]))
         placed: list[_Placed] = []
         found, gaps_us = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for channel, rows, frames in by_channel(columns):
-            if self._limit is not None:
-                placed += self._too_busy(self._limit, channel, rows, frames)
+            if self._load is not None:
+                placed += self._too_busy(channel, rows, frames)
             places, gaps = self._selections.setdefault(channel, _BusSelection(self._made)).take(
                 frames
             )
@@ -99,37 +94,28 @@ class ColumnChecker:
             lost: report of the source about lost frames and items that are not frames.
             errors: report of the source about errors in addition to its error frames.
         """
-        found = []
-        for channel, seconds in sorted(self._loads.items()):
-            window = seconds.load.end()
-            text = self._limit.judge(channel, window) if self._limit else None
-            found += [TrafficFinding(window.at_us, MaxLoad.name, text)] if text else []
-        latest_us: dict[int, int] = {}
-        for selection in self._selections.values():
-            for ident, one in selection.seen():
-                latest_us[ident] = max(one.last_us, latest_us.get(ident, one.last_us))
-        return found + ended(self._rules, self._made, latest_us, self._last_us, lost, errors)
+        loads = {channel: seconds.load for channel, seconds in self._loads.items()}
+        return self._ended(loads, self._last_us, lost, errors)
 
     def unjudged(self, without_errors: str = "") -> Unjudged:
         """Return the rules that were not judged; see `Checker.unjudged`."""
-        seen = {
+        return self._unjudged(self._last_us, without_errors)
+
+    def _evidence(self) -> Mapping[tuple[str, int], Seen]:
+        return {
             (channel, ident): one
             for channel, selection in self._selections.items()
             for ident, one in selection.seen()
         }
-        evidence = CheckedTraffic(seen, self._last_us, without_errors)
-        return unjudged(self._rules, self._made, evidence)
 
-    def _too_busy(
-        self, limit: MaxLoad, channel: str, rows: Ints, frames: Columns
-    ) -> Iterable[_Placed]:
+    def _too_busy(self, channel: str, rows: Ints, frames: Columns) -> Iterable[_Placed]:
         if channel not in self._loads:
             self._loads[channel] = ColumnLoad(int(frames.at_us[0]))
         plain = np.flatnonzero(frames.ident & ERROR == 0)
         bits = column_bits(frames.ident[plain], frames.dlc[plain], frames.payload[plain])
         for window, row in self._loads[channel].take(frames.at_us[plain], bits):
-            if text := limit.judge(channel, window):
-                yield int(rows[plain[row]]), 0, TrafficFinding(window.at_us, limit.name, text)
+            for finding in self.judge_window(channel, window):
+                yield int(rows[plain[row]]), 0, finding
 
     def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[_Placed]:
         """Apply the rules to selected frames, in the order of the log."""
