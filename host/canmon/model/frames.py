@@ -32,7 +32,15 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple, assert_never
 
 from tickrig.host.text.values import parse_time_us
-from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
+from tickrig.wire.can import (
+    ERROR_CLASS_MASK,
+    ERROR_FLAG,
+    EXTENDED_MAX,
+    MAX_DATA_BYTES,
+    CanFrame,
+    ErrorFrame,
+    FdFrame,
+)
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
@@ -121,6 +129,17 @@ def fd_ident(frame: FdFrame) -> int:
 def any_ident(frame: CanFrame | FdFrame) -> int:
     """Return the CAN-ID with its flags."""
     return fd_ident(frame) if isinstance(frame, FdFrame) else ident_of(frame)
+
+
+def frame_of(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
+    """Return the frame with an identifier and its flags. The payload is a little-endian number."""
+    data = payload.to_bytes(MAX_DATA_BYTES, "little")
+    if ident & ERROR:
+        return ErrorFrame(ident & ERROR_CLASS_MASK, data)
+    extended = bool(ident & EXTENDED)
+    if ident & REMOTE:
+        return CanFrame(ident & EXTENDED_MAX, b"", True, extended, dlc)
+    return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, extended)
 
 
 def ident_text(ident: int) -> str:

@@ -10,15 +10,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tickrig._lazy import LazyModule
-from tickrig.host.canmon.model.frames import ERROR, EXTENDED, FD, REMOTE, Record, flagged_id
-from tickrig.wire.can import (
-    ERROR_CLASS_MASK,
-    EXTENDED_MAX,
-    STANDARD_MAX,
-    CanFrame,
-    ErrorFrame,
-    FdFrame,
-)
+from tickrig.host.canmon.model.frames import FD, Record, flagged_id, frame_of
+from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame, ErrorFrame, FdFrame
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,7 +25,6 @@ else:  # an extra
 _MANY: Final = 50_000
 """The number of frames from which importing numpy pays off."""
 
-_DATA_BYTES: Final = 8
 _SPIKE_FRAMES: Final = 3
 
 
@@ -98,7 +90,7 @@ class BusFrames:
         self.at_us.append(record.at_us)
         self.ident.append(flagged_id(record) | (FD if isinstance(frame, FdFrame) else 0))
         self.dlc.append(frame.dlc if isinstance(frame, CanFrame) else len(data))
-        self.payload.append(int.from_bytes(data[:_DATA_BYTES], "little"))
+        self.payload.append(int.from_bytes(data[:MAX_DATA_BYTES], "little"))
         self.number.append(number)
         self.sent.append(record.sent)
 
@@ -113,13 +105,7 @@ class BusFrames:
 
     def frame(self, row: int) -> CanFrame | ErrorFrame:
         """Return a classic frame or an error frame."""
-        ident, dlc = self.ident[row], self.dlc[row]
-        data = self.payload[row].to_bytes(_DATA_BYTES, "little")
-        if ident & ERROR:
-            return ErrorFrame(ident & ERROR_CLASS_MASK, data)
-        if ident & REMOTE:
-            return CanFrame(ident & EXTENDED_MAX, b"", True, bool(ident & EXTENDED), dlc)
-        return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, bool(ident & EXTENDED))
+        return frame_of(self.ident[row], self.dlc[row], self.payload[row])
 
     def place(self, row: int) -> FramePlace:
         """Return the position and time of a frame in the log."""

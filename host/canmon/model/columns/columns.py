@@ -21,10 +21,10 @@ from typing import Any, Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record, flagged_id
+from tickrig.host.canmon.model.frames import ERROR, Record, flagged_id, frame_of
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.traffic import WINDOW_US, BusSecond, Load
-from tickrig.wire.can import ERROR_CLASS_MASK, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
+from tickrig.wire.can import ErrorFrame, FdFrame
 
 _MOST_CHANNELS: Final = 256
 
@@ -167,7 +167,7 @@ def records(columns: Columns) -> list[Record]:
     names = columns.channels
     rows = zip(*(part.tolist() for part in columns.parts), strict=True)
     return [
-        Record(at_us, names[channel], _frame(ident, dlc, payload), sent)
+        Record(at_us, names[channel], frame_of(ident, dlc, payload), sent)
         for at_us, ident, dlc, payload, sent, channel in rows
     ]
 
@@ -175,17 +175,7 @@ def records(columns: Columns) -> list[Record]:
 def record_at(columns: Columns, row: int) -> Record:
     """Return one frame."""
     at_us, ident, dlc, payload, sent, channel = (part[row].item() for part in columns.parts)
-    return Record(at_us, columns.channels[channel], _frame(ident, dlc, payload), sent)
-
-
-def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
-    data = payload.to_bytes(8, "little")
-    if ident & ERROR:
-        return ErrorFrame(ident & ERROR_CLASS_MASK, data)
-    extended = bool(ident & EXTENDED)
-    if ident & REMOTE:
-        return CanFrame(ident & EXTENDED_MAX, b"", True, extended, dlc)
-    return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, extended)
+    return Record(at_us, columns.channels[channel], frame_of(ident, dlc, payload), sent)
 
 
 Numbers = TypeVar("Numbers", bound=npt.NDArray[Any])
