@@ -474,14 +474,10 @@ class ColumnReader:
             self.tally = reader.tally
 
     def _pieces_of_lines(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        lines, whole = log_reader.LogLines(), log_reader.WholeLines()
+        lines = log_reader.LogLines()
         lines.tally = self.tally
-        with log_file.open_log(self._path) as file:
-            for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
-                if text := whole.push(data):
-                    yield from self._piece(text, lines, len(text) - data.rfind(b"\n") - 1)
-        if rest := whole.finish():
-            yield from self._piece(rest + b"\n", lines, len(rest))
+        for text, held in self._whole_lines():
+            yield from self._piece(text, lines, held)
 
     def _piece(
         self, text: bytes, lines: log_reader.LogLines, held: int
@@ -514,28 +510,22 @@ class ColumnReader:
         yield columns
 
     def _pieces_of_blocks(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        reader = log_reader.read_log(self._path)
+        reader, failed = log_reader.read_log(self._path), None
         singles = list[log_reader.Item]()
-        failed = None
-        frames = self._frames(reader)
-        while failed is None:
-            try:
-                found = next(frames)
-            except StopIteration:
-                break
-            except (log_file.LogError, OSError) as error:  # all that was read before it counts
-                failed = error
-                break
-            self.tally = reader.tally
-            if isinstance(found, Record):
-                singles.append(found)
-                if len(singles) < _ITEMS:
-                    continue
-            if singles:
-                yield singles
-                singles = []
-            if not isinstance(found, Record):
-                yield found.columns(self._channels)
+        try:
+            for found in self._frames(reader):
+                self.tally = reader.tally
+                if isinstance(found, Record):
+                    singles.append(found)
+                    if len(singles) < _ITEMS:
+                        continue
+                if singles:
+                    yield singles
+                    singles = []
+                if not isinstance(found, Record):
+                    yield found.columns(self._channels)
+        except (log_file.LogError, OSError) as error:  # all that was read before it counts
+            failed = error
         self.tally = reader.tally
         if singles:
             yield singles
@@ -545,33 +535,31 @@ class ColumnReader:
     def _of_frames(self) -> Iterator[Rows]:
         """Read frames in pieces, with many frames together if the format supports columns."""
         reader, failed = log_reader.read_log(self._path), None
-        frames, rows, singles = self._frames(reader), list[Rows](), list[Record]()
-        more = True
-        while more:
-            rows.clear()
-            held, more = 0, False
-            try:
-                for found in frames:
-                    if isinstance(found, Record):
-                        singles.append(found)
-                        held += 1
-                    else:
-                        rows += [Rows.of(singles, self._channels)] if singles else []
-                        singles.clear()
-                        rows.append(found)
-                        held += len(found.known)
-                    if held >= _BATCH:
-                        more = True
-                        break
-            except (log_file.LogError, OSError) as error:  # all that was read before it counts
-                failed = error
-            self.tally = reader.tally
-            rows += [Rows.of(singles, self._channels)] if singles else []
-            singles.clear()
-            if held:
-                yield Rows.joined(rows)
+        rows, singles, held = list[Rows](), list[Record](), 0
+        try:
+            for found in self._frames(reader):
+                if isinstance(found, Record):
+                    singles.append(found)
+                    held += 1
+                else:
+                    rows += [*self._batch(singles), found]
+                    held += len(found.known)
+                if held >= _BATCH:
+                    self.tally = reader.tally
+                    yield Rows.joined([*rows, *self._batch(singles)])
+                    rows, held = [], 0
+        except (log_file.LogError, OSError) as error:  # all that was read before it counts
+            failed = error
+        self.tally = reader.tally
+        if held:
+            yield Rows.joined([*rows, *self._batch(singles)])
         if failed is not None:
             raise failed
+
+    def _batch(self, singles: list[Record]) -> list[Rows]:
+        rows = [Rows.of(singles, self._channels)] if singles else []
+        singles.clear()
+        return rows
 
     def _frames(self, reader: log_reader.LogReader) -> Iterator[Record | Rows]:
         if self._kind is not log_file.LogFormat.BLF:
@@ -584,16 +572,22 @@ class ColumnReader:
         return (one if isinstance(one, Record) else one.rows for one in found)
 
     def _of_lines(self) -> Iterator[Rows]:
-        whole, number, clock = log_reader.WholeLines(), 0, None
+        number, clock = 0, None
+        for text, _ in self._whole_lines():
+            clock = clock or ScreenClock.of(text[:HEAD].decode("latin-1"))
+            rows = self._take_apart(text, number, clock)
+            number += len(rows.known)
+            yield rows
+
+    def _whole_lines(self) -> Iterator[tuple[bytes, int]]:
+        """Read whole lines. Each text comes with how many of its bytes an earlier block held."""
+        whole = log_reader.WholeLines()
         with log_file.open_log(self._path) as file:
             for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
-                if lines := whole.push(data):
-                    clock = clock or _clock_of(lines)
-                    rows = self._take_apart(lines, number, clock)
-                    number += len(rows.known)
-                    yield rows
+                if text := whole.push(data):
+                    yield text, len(text) - data.rfind(b"\n") - 1
         if rest := whole.finish():
-            yield self._take_apart(rest + b"\n", number, clock or _clock_of(rest))
+            yield rest + b"\n", len(rest)
 
     def _take_apart(self, text: bytes, number: int, clock: ScreenClock) -> Rows:
         """Return a row for each line. `number` is the number of lines before these lines."""
@@ -605,7 +599,3 @@ class ColumnReader:
             if record is not None:
                 rows.put(row, record, self._channels.place(record.channel))
         return rows
-
-
-def _clock_of(lines: bytes) -> ScreenClock:
-    return ScreenClock.of(lines[:HEAD].decode("latin-1"))
