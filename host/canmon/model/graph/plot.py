@@ -217,22 +217,15 @@ def _stops(series: Series, view: View, columns: int) -> tuple[_Stop, ...]:
 
 def _runs(series: Series, view: View, columns: int) -> Iterator[_StateRun]:
     """Yield the states in a view. Each state lasts until the next one."""
-    if not series.at_us:
-        return
-    first = max(0, (series.before(view.from_us) or 0))
-    begin, name = (
-        0 if series.at_us[first] <= view.from_us else -1,
-        series.name(series.values[first]),
-    )
+    begin, name = -1, ""
+    first = series.before(view.from_us) or 0
     for index in range(first, len(series)):
         at_us, now = series.at_us[index], series.name(series.values[index])
         if at_us > view.to_us:
             break
         column = max(0, (at_us - view.from_us) * columns // (view.span_us + 1))
-        if begin < 0:
-            begin, name = column, now
-        elif now != name:
-            if column > begin:
+        if now != name or begin < 0:
+            if column > begin >= 0:
                 yield _StateRun(begin, column, name)
             begin, name = column, now
     if begin >= 0:
@@ -317,7 +310,7 @@ def svg(
         f"<style>{_STYLE}</style>",
         '<rect width="100%" height="100%" fill="#fff"/>',
         f'<clipPath id="area">{_rect(area)}</clipPath>',
-        *_svg_title(title),
+        _text_element(_AXIS_WIDTH, _TITLE_HEIGHT - 6, "start", title) if title else "",
         *_svg_time_axis(view, area, len(drawn.bands)),
         *(_value_axes(drawn, area) if drawn.curves else ()),
         f'<g clip-path="url(#area)">{"".join(_curves(drawn, area))}</g>',
@@ -346,11 +339,6 @@ def state_colour(band: Band, name: str) -> str:
     if name not in names:
         return _KNOWN_STATES[name]
     return _STATE_COLOURS[list(names).index(name) % len(_STATE_COLOURS)]
-
-
-def _svg_title(title: str) -> Iterator[str]:
-    if title:
-        yield _text_element(_AXIS_WIDTH, _TITLE_HEIGHT - 6, "start", title)
 
 
 def _svg_bands(bands: Sequence[Band], area: _Area) -> Iterator[str]:
@@ -630,14 +618,13 @@ def _names(series: Sequence[Series], cursor_us: int | None, width: int, colour: 
 def _drawn(drawn: Chart, width: int, height: int) -> Canvas:
     canvas = Canvas(width, height, max(1, len(drawn.curves)))
     for layer, curve in enumerate(drawn.curves):
-        low, high = drawn.ranges[curve.axis]
-        per_value = (height * DOTS_Y - 1) / (high - low)
-        _draw(canvas, layer, curve, high, per_value)
+        _draw(canvas, layer, curve, drawn.ranges[curve.axis])
     return canvas
 
 
-def _draw(canvas: Canvas, layer: int, curve: Curve, high: float, per_value: float) -> None:
-    columns = canvas.width * DOTS_X
+def _draw(canvas: Canvas, layer: int, curve: Curve, shown: tuple[float, float]) -> None:
+    low, high = shown
+    columns, per_value = canvas.width * DOTS_X, (canvas.height * DOTS_Y - 1) / (high - low)
 
     def row(value: float) -> int:
         return round((high - value) * per_value)
