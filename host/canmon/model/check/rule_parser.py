@@ -28,11 +28,10 @@ from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, Traff
 from tickrig.host.canmon.model.decode import filter as filters
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.filter import FilterError, FilterParser, Token
-from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.series import EXTENDED, FrameSlice, parse_slice
+from tickrig.host.canmon.model.frames import Record, flagged_id
+from tickrig.host.canmon.model.graph.series import FrameSlice, parse_slice
 from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_us
-from tickrig.wire.can import ErrorFrame
 
 # A rule written as an expression, checked against decoded frames one by one.
 
@@ -154,11 +153,8 @@ class _SliceParser(FilterParser):
 
 def _with_slices(record: Record, decoded: Decoded, slices: Iterable[_Slice]) -> Decoded:
     """Return a decoded frame with the added values of its slices."""
-    frame = record.frame
-    if isinstance(frame, ErrorFrame) or frame.remote:
-        return decoded
-    key = frame.can_id | EXTENDED if frame.extended else frame.can_id
-    values = [(name, cut.value(frame.data)) for name, cut in slices if cut.key == key]
+    key, data = flagged_id(record), record.frame.data  # a remote or error frame has other flags
+    values = [(name, cut.value(data)) for name, cut in slices if cut.key == key]
     found = [Signal(name, _plain(value)) for name, value in values if value is not None]
     if not found:
         return decoded

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.node_memory import BITS, drive_state
 from tickrig.host.canmon.model.decode.services import nmt_state_name
-from tickrig.host.canmon.model.frames import Record, Stamp
+from tickrig.host.canmon.model.frames import EXTENDED, Record, Stamp, flagged_id
 from tickrig.host.canmon.model.traffic import NO_RATES, BitRates
 from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame, FdFrame, frame_bits
 from tickrig.wire.canopen.emcy import describe
@@ -48,9 +48,6 @@ if TYPE_CHECKING:
 
 # What people write to name a curve: `speed=3.velocity_actual_value@2`, `181[2:6]s*0.001`.
 
-
-EXTENDED: Final = 1 << 31
-"""Flag of a 29-bit identifier in a key."""
 
 _FORM: Final = (
     "ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s*0.001: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5;"
@@ -360,10 +357,10 @@ class Series:
             self.append(time_us, value)
 
     def append_state(self, at_us: int, value: float, name: str) -> None:
-        """Add a state."""
-        if self.names is None:
-            self.names = {}
-        self.names[value] = name
+        """Add a value, and the name of the state that it stands for, if it does."""
+        if name:
+            self.names = self.names or {}
+            self.names[value] = name
         self.append(at_us, value)
 
     def name(self, value: float) -> str:
@@ -498,7 +495,7 @@ class Collector:
     @property
     def missing(self) -> list[str]:
         """The objects that did not occur, as the user wrote them."""
-        return [one.text for one in self._objects if not one.is_found]
+        return [one.word.text for one in self._objects if one.found is None]
 
     def join(self, other: Collector) -> None:
         """Add the signals and the samples of another collector."""
@@ -524,9 +521,8 @@ class Collector:
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
         """Add the values in a frame that is already decoded, or has none of the wanted objects."""
         at_us, _, frame, _ = record
-        if not isinstance(frame, ErrorFrame) and not frame.remote:
-            key = frame.can_id | EXTENDED if frame.extended else frame.can_id
-            for cut, series in self._slices.get(key, ()):
+        if self._slices:  # a key has no flag of a remote or error frame
+            for cut, series in self._slices.get(flagged_id(record), ()):
                 value = cut.value(frame.data)
                 if value is not None:
                     series.append(at_us, value)
@@ -540,12 +536,12 @@ class Collector:
 
     def _sample(self, beside: _Sampler, node: int, record: Record, decoded: Decoded | None) -> None:
         """Begin a series for one more node with a signal of any node."""
-        for one in self._samplers:
-            if (one.wanted.kind, one.node) == (beside.wanted.kind, node):
-                return
-        word = replace(beside.word, source=_BusSignal(beside.wanted.kind, node))
-        series = Series("", word.axis, most=beside.series.most)
-        sampler = _Sampler(word, _BusSignal(beside.wanted.kind, node), series, self._rates)
+        kind = beside.wanted.kind
+        if any((one.wanted.kind, one.node) == (kind, node) for one in self._samplers):
+            return
+        wanted = _BusSignal(kind, node)
+        series = Series("", beside.word.axis, most=beside.series.most)
+        sampler = _Sampler(replace(beside.word, source=wanted), wanted, series, self._rates)
         sampler.take(record, decoded)
         self.series.append(series)
         self._samplers.append(sampler)
@@ -620,10 +616,7 @@ class _Sampler:
             if decoded.node != self.node:
                 return decoded.node if self.wanted.node is None else None
             for value, name in values:
-                if name:
-                    self.series.append_state(record.at_us, value, name)
-                else:
-                    self.series.append(record.at_us, value)
+                self.series.append_state(record.at_us, value, name)
         return None
 
     def _values(self, decoded: Decoded) -> list[tuple[float, str]]:
@@ -683,47 +676,35 @@ class _Object:
     def __init__(
         self, word: CurveSpec, wanted: ObjectName, series: Series, known: dict[str, None]
     ) -> None:
-        self._word, self._wanted, self.series = word, wanted, series
+        self.word, self._wanted, self.series = word, wanted, series
         self._known = known
-        self._found: tuple[int | None, str] | None = None
+        self.found: tuple[int | None, str] | None = None
         self._is_state = False
-
-    @property
-    def is_found(self) -> bool:
-        """Whether the object has occurred."""
-        return self._found is not None
-
-    @property
-    def text(self) -> str:
-        """The text of the object as the user wrote it."""
-        return self._word.text
 
     def take(self, at_us: int, decoded: Decoded) -> None:
         """Add the value of the object if it is among the signals of the frame."""
-        if self._found is None and len(self._known) < _MOST_HEARD:
+        if self.found is None and len(self._known) < _MOST_HEARD:
             self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
             return
         for signal in decoded.signals:
             place = decoded.node, signal.name
-            if self._found is None and signal.name.lower().startswith(self._wanted.name):
+            if self.found is None and signal.name.lower().startswith(self._wanted.name):
                 self._find(place, signal.unit)
-            if place == self._found and (value := self._wanted.value(signal)) is not None:
-                if self._is_state and signal.text:
-                    name = drive_state(int(value)) or signal.text
-                    self.series.append_state(at_us, value, name)
-                else:
-                    self.series.append(at_us, value)
+            if place == self.found and (value := self._wanted.value(signal)) is not None:
+                is_named = self._is_state and signal.text
+                name = (drive_state(int(value)) or signal.text) if is_named else ""
+                self.series.append_state(at_us, value, name)
 
     def _find(self, place: tuple[int | None, str], unit: str) -> None:
         """Keep the first object that fits, and use its name for the curve."""
-        self._found = place
+        self.found = place
         self._is_state = self._wanted.bit is None and place[1] == _STATUSWORD
         if self._wanted.bit is None:
             self.series.unit = unit
-        if not self._word.label:
-            begun = self._word.text.lower().rfind(self._wanted.name)
-            bit = self._word.text[begun + len(self._wanted.name) :]
+        if not self.word.label:
+            begun = self.word.text.lower().rfind(self._wanted.name)
+            bit = self.word.text[begun + len(self._wanted.name) :]
             self.series.label = _named(*place) + bit
 
 
