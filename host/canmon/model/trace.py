@@ -50,51 +50,49 @@ class Ring:
 
     Args:
         capacity: number of rows that are kept.
+
+    Attributes:
+        count: number of rows that were added.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
         self._rows: deque[TraceRow] = deque(maxlen=capacity)
-        self._count = 0
-
-    @property
-    def count(self) -> int:
-        """The number of rows that were added."""
-        return self._count
+        self.count = 0
 
     @property
     def first(self) -> int:
         """The number of the oldest row that is kept."""
-        return self._count - len(self._rows)
+        return self.count - len(self._rows)
 
     def append(self, row: TraceRow) -> None:
         """Add a row at the end."""
         self._rows.append(row)
-        self._count += 1
+        self.count += 1
 
     def rows(self, begin: int, count: int) -> list[TraceRow]:
         """Return rows by number. Dropped and future rows are left out."""
-        first = min(max(begin, self.first), self._count)
-        end = min(max(begin + count, first), self._count)
-        if first - self.first < self._count - end:
+        first = min(max(begin, self.first), self.count)
+        end = min(max(begin + count, first), self.count)
+        if first - self.first < self.count - end:
             return list(islice(self._rows, first - self.first, end - self.first))
-        found = islice(reversed(self._rows), self._count - end, self._count - first)
+        found = islice(reversed(self._rows), self.count - end, self.count - first)
         return list(found)[::-1]  # the latest are near this end
 
     def tail(self, count: int) -> list[TraceRow]:
         """Return the latest rows."""
-        return self.rows(self._count - count, count)
+        return self.rows(self.count - count, count)
 
     def copy(self) -> Ring:
         """Return a copy to which no further rows are added."""
         found = Ring(self._rows.maxlen or _CAPACITY)
         found._rows.extend(self._rows)
-        found._count = self._count
+        found.count = self.count
         return found
 
     def clear(self) -> None:
         """Delete all rows."""
         self._rows.clear()
-        self._count = 0
+        self.count = 0
 
 
 class FrameTrace(Ring):
