@@ -57,11 +57,9 @@ _EXACT: Final = 1 << 53
 _PLAIN, _FRAME, _NOTE, _ODD = range(4)
 _KINDS: Final = np.full(256, _PLAIN, np.uint8)
 """Kind of an object by its type. The last entry is for all larger types."""
-_KINDS[list(_FRAMES)], _KINDS[list(can_log.BLF_NOTES)], _KINDS[list(can_log.BLF_FRAMES)] = (
-    _FRAME,
-    _NOTE,
-    _ODD,
-)
+_KINDS[list(_FRAMES)] = _FRAME
+_KINDS[list(can_log.BLF_NOTES)] = _NOTE
+_KINDS[list(can_log.BLF_FRAMES)] = _ODD
 
 
 class _Objects:

@@ -179,10 +179,8 @@ class _ColumnGaps:
 
     def _grow(self, count: int) -> None:
         self.latest_us, self._frames = grown(self.latest_us, count), grown(self._frames, count)
-        self._total_us, self._wander_us = (
-            grown(self._total_us, count),
-            grown(self._wander_us, count),
-        )
+        self._total_us = grown(self._total_us, count)
+        self._wander_us = grown(self._wander_us, count)
         self._min_us, self._max_us = grown(self._min_us, count), grown(self._max_us, count)
 
     def _wander(self, runs: Runs) -> Ints:
@@ -225,10 +223,8 @@ class _ColumnGaps:
         gaps = Gaps()
         gaps.count = int(self._frames[number]) - 1
         if gaps.count:
-            gaps.total_us, gaps.wander_us = (
-                int(self._total_us[number]),
-                int(self._wander_us[number]),
-            )
+            gaps.total_us = int(self._total_us[number])
+            gaps.wander_us = int(self._wander_us[number])
             gaps.min_us, gaps.max_us = int(self._min_us[number]), int(self._max_us[number])
             first = number << _BUCKET_BITS
             begin, end = np.searchsorted(self._keys, (first, first + (1 << _BUCKET_BITS)))

@@ -267,9 +267,8 @@ class Identifiers:
         self._sorted = np.insert(self._sorted, places, idents)
         self._numbers = np.insert(self._numbers, places, numbers)
         self.idents = np.append(self.idents, idents.astype(np.int64))
-        self.first_us, self.last_us = (
-            grown(column, len(self)) for column in (self.first_us, self.last_us)
-        )
+        self.first_us = grown(self.first_us, len(self))
+        self.last_us = grown(self.last_us, len(self))
 
 
 def grown(column: Numbers, count: int) -> Numbers:

@@ -272,11 +272,8 @@ def _take_answer(running: _OpenTransfer, answer: _Answer) -> str:
         running.data += answer.data
         running.sized = answer.size is not None
         return "upload"
-    running.mode, running.phase, running.size = (
-        TransferMode.SEGMENTED,
-        _TransferPhase.SEGMENTS,
-        answer.size,
-    )
+    running.mode, running.size = TransferMode.SEGMENTED, answer.size
+    running.phase = _TransferPhase.SEGMENTS
     size = "their size is not indicated" if answer.size is None else running.progress
     return f"segments follow, {size}"
 
