@@ -31,7 +31,7 @@ from tickrig.host.canmon.model.columns.columns import (
     records,
     split_errors,
 )
-from tickrig.host.canmon.model.frames import REMOTE, Record
+from tickrig.host.canmon.model.frames import REMOTE
 from tickrig.host.canmon.model.traffic import EXACT_US, SUB_BITS, Gaps
 from tickrig.wire import can
 from tickrig.wire.can import CanFrame, ErrorFrame
@@ -413,7 +413,14 @@ class _ColumnBus:
             self._changes.rows(),
             strict=True,
         )
-        return sorted(_id_row(self._channel, *row) for row in values)
+        rows, channel = list[traffic.IdRow](), self._channel
+        for ident, first_us, latest, gap_us, gaps, bits, changed in values:
+            frame, known_us = latest.frame, gap_us if gaps.count else None
+            assert isinstance(frame, CanFrame)
+            times = gaps.count + 1, first_us, latest.at_us
+            row = traffic.IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)
+            rows.append(row)
+        return sorted(rows)
 
     def _latest(self) -> Columns:
         """Return the latest frame of each identifier."""
@@ -421,20 +428,3 @@ class _ColumnBus:
         channel, sent = np.zeros(len(idents), np.uint8), np.zeros(len(idents), np.bool_)
         ident, payload = idents.idents.astype(np.uint32), self._changes.payload
         return Columns(idents.last_us, ident, self._dlc, payload, sent, channel, (self._channel,))
-
-
-def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
-    channel: str,
-    ident: int,
-    first_us: int,
-    latest: Record,
-    gap_us: int,
-    gaps: traffic.Gaps,
-    bits: int,
-    changed: traffic.BitRow,
-) -> traffic.IdRow:
-    frame = latest.frame
-    assert isinstance(frame, CanFrame)
-    known_us = gap_us if gaps.count else None
-    times = (gaps.count + 1, first_us, latest.at_us)
-    return traffic.IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)
