@@ -372,7 +372,8 @@ class _Table(NamedTuple):
     Attributes:
         ids: leading column with the identifiers.
         columns: columns of numbers.
-        payload: last cell of a row, and its title.
+        text: function that writes the last cell of a row.
+        title: title of this cell.
         styled: whether to mark changes. The lines are then not cut, because a style must not be
             cut.
         width: width of the screen in characters.
@@ -380,7 +381,8 @@ class _Table(NamedTuple):
 
     ids: _IdText
     columns: tuple[_TopColumn, ...]
-    payload: tuple[Callable[[traffic.IdRow, bool], str], str]
+    text: Callable[[traffic.IdRow, bool], str]
+    title: str
     styled: bool
     width: int
 
@@ -389,37 +391,33 @@ class _Table(NamedTuple):
         """Choose the columns that fit."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
         ids = _IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
-        room = width - ids.width - _payload_width(view) - 1
+        text, title, payload_width = _payload(view)
+        room = width - ids.width - payload_width - 1
         columns = _fitting(room)
         fits = room >= sum(column.width + 1 for column in columns)
         styled = view.styled and fits and (view.bits or view.meaning is None)
-        return cls(ids, columns, _payload(view), styled, width)
+        return cls(ids, columns, text, title, styled, width)
 
     def titles(self) -> str:
         """Return the line with the titles."""
         cells = [f"{column.title:>{column.width}}" for column in self.columns]
-        return " ".join([self.ids.title(), *cells, self.payload[1]])[: self.width]
+        return " ".join([self.ids.title(), *cells, self.title])[: self.width]
 
     def line(self, row: traffic.IdRow, now_us: int) -> str:
         """Return the line of a row."""
         cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
-        line = " ".join([self.ids.of(row), *cells, self.payload[0](row, self.styled)])
+        line = " ".join([self.ids.of(row), *cells, self.text(row, self.styled)])
         return (line if self.styled else line[: self.width]).rstrip()
 
 
-def _payload_width(view: TableView) -> int:
-    if view.bits:
-        return _HEAT_WIDTH
-    return _DATA_WIDTH if view.meaning is None else _MEANING_WIDTH
-
-
-def _payload(view: TableView) -> tuple[Callable[[traffic.IdRow, bool], str], str]:
+def _payload(view: TableView) -> tuple[Callable[[traffic.IdRow, bool], str], str, int]:
+    """Return the text, the title and the width of the last cell."""
     meaning = view.meaning
     if view.bits:
-        return _heat_text, "bits that change"
+        return _heat_text, "bits that change", _HEAT_WIDTH
     if meaning is None:
-        return _data_text, "data"
-    return lambda row, styled: meaning(row), "meaning"
+        return _data_text, "data", _DATA_WIDTH
+    return lambda row, styled: meaning(row), "meaning", _MEANING_WIDTH
 
 
 _PAGE: Final = 10
