@@ -632,12 +632,9 @@ class _RuleParser(_QuantityParser):
                 return demands.Every(event, *self._span())
             case "within":
                 most_us = self._time()
-                first = self._event() if self._take("after") else None
-                return (
-                    demands.Latency(first, event, most_us)
-                    if first
-                    else demands.FirstWithin(event, most_us)
-                )
+                if self._take("after"):
+                    return demands.Latency(self._event(), event, most_us)
+                return demands.FirstWithin(event, most_us)
             case "to":
                 second = self._event()
                 return demands.Latency(event, second, self._under())
