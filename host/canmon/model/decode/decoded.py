@@ -136,11 +136,9 @@ class Transfer:
 
     def _notes(self) -> list[str]:
         """Return details to show besides the value."""
-        notes = (
-            []
-            if self.mode is TransferMode.EXPEDITED
-            else [f"{self.mode}, {len(self.data or b'')} B"]
-        )
+        notes = list[str]()
+        if self.mode is not TransferMode.EXPEDITED:
+            notes.append(f"{self.mode}, {len(self.data or b'')} B")
         if self.outcome is TransferOutcome.ABORTED:
             by = "client" if self.by_client else "server"
             notes.append(f"aborted by {by}: {describe_abort(self.abort_code)}")

@@ -16,7 +16,7 @@ The module also describes the known identity of a node, and the known contents o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -360,17 +360,14 @@ def board_json(board: NodeBoard, now_us: int) -> list[str]:
 
 
 def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
-    boots = (
-        f"{row.boots} ({row.unrequested_boots} unasked)"
-        if row.unrequested_boots
-        else f"{row.boots}"
-    )
+    boots = str(row.boots or "")
+    boots += f" ({row.unrequested_boots} unasked)" if row.unrequested_boots else ""
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
         name_text(row),
         row.state_text,
         _heartbeat(row, now_us),
-        boots if row.boots else "",
+        boots,
         row.drive_state,
         _emcy(row),
         f"{row.sdo_error} [{row.sdo_errors}]" if row.sdo_errors else "",
@@ -477,11 +474,7 @@ class _PdoContent(NamedTuple):
 
 def pdo_contents(row: NodeStatus) -> list[_PdoContent]:
     """Return the known PDOs of a node. The PDOs that the node sends come first."""
-    return list(_pdos(row))
-
-
-def _pdos(row: NodeStatus) -> Iterator[_PdoContent]:
-    memory = row.memory
+    memory, found = row.memory, list[_PdoContent]()
     for pdo in sorted(pdos_of(row.node, memory.indices)):
         can_id, count = can_id_of(pdo, memory), memory.number(pdo.mapping, 0)
         if can_id is None or count == 0:
@@ -496,7 +489,8 @@ def _pdos(row: NodeStatus) -> Iterator[_PdoContent]:
             names = _names(memory, pdo.mapping, min(count, MAX_MAPPED_OBJECTS))
             heard = row.pdos.get(pdo.kind)
             text = f"{heard.text if heard else ', '.join(names)} ({source})"
-        yield _PdoContent(pdo.kind, can_id, pdo.receives, names, text)
+        found.append(_PdoContent(pdo.kind, can_id, pdo.receives, names, text))
+    return found
 
 
 def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:
