@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
@@ -269,7 +269,7 @@ class Survey(NodeBoard):
         self.bits = TimeBins[str]()
         self.errors = TimeBins[str]()
         self.values = TimeBins[SignalName]()
-        self.lanes: dict[tuple[str, int], _NodeLane] = {}
+        self.lanes: defaultdict[tuple[str, int], _NodeLane] = defaultdict(_NodeLane)
         self.signals: dict[SignalName, SignalTrack] = {}
         self.signals_left: set[SignalName] = set()
 
@@ -318,18 +318,18 @@ class Survey(NodeBoard):
         elif node is None:
             return
         elif kind == "emcy":
-            self.lane(channel, node).emcys.append(Mark(since_us, decoded.text))
+            self.lanes[channel, node].emcys.append(Mark(since_us, decoded.text))
         elif kind == "sdo":
             for transfer in decoded.transfers:
                 self._take_transfer(channel, node, transfer)
         elif kind == "boot-up":
-            lane = self.lane(channel, node)
+            lane = self.lanes[channel, node]
             lane.boots.append(Mark(since_us, "boot-up"))
             lane.states.take(since_us, nmt_state_name(NmtState.PRE_OPERATIONAL))
         elif kind in ("heartbeat", "guard") and decoded.signals:
             state = decoded.signals[0].value
             assert isinstance(state, int)
-            self.lane(channel, node).states.take(since_us, nmt_state_name(state))
+            self.lanes[channel, node].states.take(since_us, nmt_state_name(state))
 
     def take_signals(self, record: Record, decoded: Decoded) -> None:
         """Add the values of a PDO, or of a message of a DBC file."""
@@ -361,7 +361,7 @@ class Survey(NodeBoard):
         begin_us = self.since(from_us)
         text = f"no heartbeat for {(to_us - from_us) / 1e3:.0f} ms"
         gap = Mark(begin_us, text, max(0, self.since(to_us) - begin_us))
-        self.lane(channel, node).gaps.append(gap)
+        self.lanes[channel, node].gaps.append(gap)
 
     def _take_command(self, channel: str, since_us: int, decoded: Decoded) -> None:
         for (bus, node), lane in self.lanes.items():
@@ -374,17 +374,10 @@ class Survey(NodeBoard):
     def _take_transfer(self, channel: str, node: int, transfer: Transfer) -> None:
         if not transfer.outcome.answered and self.row(channel, node) is None:
             return
-        lane = self.lane(channel, node)
+        lane = self.lanes[channel, node]
         done = transfer.outcome is TransferOutcome.DONE and not transfer.flaws
         mark = Mark(self.since(transfer.at_us), str(transfer), transfer.duration_us)
         (lane.transfers if done else lane.failures).append(mark)
-
-    def lane(self, channel: str, node: int) -> _NodeLane:
-        """Return the lane of a node."""
-        lane = self.lanes.get((channel, node))
-        if lane is None:
-            lane = self.lanes[channel, node] = _NodeLane()
-        return lane
 
     def _take_signal(self, name: SignalName, since_us: int, signal: Signal, source: str) -> None:
         value = signal.value

@@ -275,7 +275,7 @@ _HEADS: Final = (
 def _node(
     survey: Survey, row: NodeStatus, diagnosis: Diagnosis, *, several: bool
 ) -> dict[str, object]:
-    lane = survey.lane(row.channel, row.node)
+    lane = survey.lanes[row.channel, row.node]
     label = f"{row.channel} node {row.node}" if several else f"Node {row.node}"
     gaps = _gaps(survey, row, lane.gaps, diagnosis)
     boots = f"{row.boots}" + f" ({row.unrequested_boots} unasked)" * bool(row.unrequested_boots)

@@ -203,7 +203,7 @@ class ColumnSurvey:
             written = answer & 0xFF == _WRITTEN
             if written or row is None or row.drive_state != drive_state(answer >> 32):
                 return False
-        return survey.lane(channel, node).transfers.pass_over()
+        return survey.lanes[channel, node].transfers.pass_over()
 
     def _take_values(
         self, channel: str, layouts: Mapping[int, PdoDecoder], frames: Columns
