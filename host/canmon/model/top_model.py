@@ -211,13 +211,11 @@ class LineTraffic:
         at_us, decoded = line.at_us, line.decoded
         key = line.channel, line.sent, _word_of(decoded)
         row = self._rows.get(key)
-        self._rows[key] = (
-            _LineRow(*key, 1, at_us, at_us, None, decoded.text)
-            if row is None
-            else _LineRow(
-                *key, row.messages + 1, row.first_us, at_us, at_us - row.last_us, decoded.text
-            )
-        )
+        if row is None:
+            self._rows[key] = _LineRow(*key, 1, at_us, at_us, None, decoded.text)
+            return
+        times = row.first_us, at_us, at_us - row.last_us
+        self._rows[key] = _LineRow(*key, row.messages + 1, *times, decoded.text)
 
     def clear(self) -> None:
         """Delete all counts."""
