@@ -122,26 +122,21 @@ def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
         first = {bus.payload[row] & 0xFF for row in few}
         if ident in ERROR_CONTROL_IDS:
             fits = sizes[1] * 4 >= len(few) * 3 and {one & ~_TOGGLE for one in first} <= _STATES
-            good["error control"] += fits
-            bad += not fits
+            service = "error control"
         elif ident == nmt.NMT_COB_ID:
-            fits = sizes[2] * 2 >= len(few) and bool(first & _COMMANDS)
-            good["nmt"] += fits
-            bad += not fits
+            service, fits = "nmt", sizes[2] * 2 >= len(few) and bool(first & _COMMANDS)
         elif ident == SYNC_ID:
-            fits = (sizes[0] + sizes[1]) * 2 > len(few)
-            good["sync"] += fits
-            bad += not fits
-        elif ident in REQUEST_IDS:
-            answered = _answers(bus, few, rows.get(ident - 0x80, ())[:64])
-            good["sdo"] += answered
-            bad += sizes[sdo_frame.FRAME_BYTES] * 2 < len(few)
-        elif ident in RESPONSE_IDS:
-            bad += sizes[sdo_frame.FRAME_BYTES] * 2 < len(few)
+            service, fits = "sync", (sizes[0] + sizes[1]) * 2 > len(few)
         elif ident in PDO_IDS:
-            good["pdo"] += 1
-        elif ident < SYNC_ID or TIME_ID < ident < PDO_IDS.start:
-            bad += 1
+            service, fits = "pdo", True
+        elif ident in RESPONSE_IDS or ident in REQUEST_IDS:
+            service, fits = "", sizes[sdo_frame.FRAME_BYTES] * 2 >= len(few)
+        else:
+            service, fits = "", not (ident < SYNC_ID or TIME_ID < ident < PDO_IDS.start)
+        if ident in REQUEST_IDS:
+            good["sdo"] += _answers(bus, few, rows.get(ident - 0x80, ())[:64])
+        good[service] += fits
+        bad += not fits
     strong = good["error control"] + good["sdo"]
     if strong:
         return bad <= 2 * strong + good["nmt"] + good["sync"] + good["pdo"]
@@ -240,15 +235,16 @@ class BusEvents:
                 one.heartbeats = sorted([*one.heartbeats, *one.answers])
                 for row in one.requested:
                     self._row = row
-                    self._hit(
-                        *("remote-heartbeat", node, nmt.ERROR_CONTROL_COB_ID + node | REMOTE),
-                        "a remote frame asks a node that sends heartbeats for its state",
-                    )
+                    said = "a remote frame asks a node that sends heartbeats for its state"
+                    self._control_hit("remote-heartbeat", node, said, REMOTE)
             elif one.toggled:
                 self._guarding(node, one)
 
     def _hit(self, rule: str, node: int | None, ident: int | None, text: str) -> None:
         self.hits.append(Hit(rule, node, ident, text, (self._row,)))
+
+    def _control_hit(self, rule: str, node: int, text: str, flag: int = 0) -> None:
+        self._hit(rule, node, nmt.ERROR_CONTROL_COB_ID + node | flag, text)
 
     # NMT and error control
 
@@ -285,29 +281,23 @@ class BusEvents:
 
     def _boot(self, at_us: int, node: int, one: NodeEvents) -> None:
         heard = self._first.get(node, self._row) < self._row
-        latest = one.boots[-1] if one.boots else None
+        since_us = at_us - int(self._times[one.boots[-1]]) if one.boots else None
         if heard and not one.reset:
-            if not self._untimed and latest is not None and at_us - self._times[latest] <= PAIR_US:
-                said = ms_text(at_us - int(self._times[latest]))
-                self._hit(
-                    *("doubled-node", node, nmt.ERROR_CONTROL_COB_ID + node),
-                    f"two boot-ups within {said} ms: two nodes have this node-ID",
-                )
+            if not self._untimed and since_us is not None and since_us <= PAIR_US:
+                said = f"two boot-ups within {ms_text(since_us)} ms: two nodes have this node-ID"
+                self._control_hit("doubled-node", node, said)
             else:
-                self._hit(
-                    *("no-reboot", node, nmt.ERROR_CONTROL_COB_ID + node),
-                    "boots again without an NMT reset",
-                )
+                self._control_hit("no-reboot", node, "boots again without an NMT reset")
         one.boots.append(self._row)
         one.reset, one.state, one.command = False, int(nmt.NmtState.INITIALISING), None
         self.cuts.append(Cut(at_us, node))
 
     def _state(self, at_us: int, node: int, one: NodeEvents, state: int) -> None:
         before, one.state = one.state, state
-        command, ident = one.command, nmt.ERROR_CONTROL_COB_ID + node
+        command = one.command
         one.told_since += 1
         if state not in _STATES:
-            self._hit("nmt-state", node, ident, f"{state:02X}h is no NMT state")
+            self._control_hit("nmt-state", node, f"{state:02X}h is no NMT state")
         elif before is None or before == nmt.NmtState.INITIALISING:
             return  # many nodes start themselves (1F80h)
         elif state != before:
@@ -317,7 +307,8 @@ class BusEvents:
             self.cuts.append(Cut(at_us, node))
             if state != wanted and not one.reset and not unseen:
                 names = nmt_state_name(before), nmt_state_name(state)
-                self._hit("nmt-state", node, ident, f"{names[0]} to {names[1]} without a command")
+                said = f"{names[0]} to {names[1]} without a command"
+                self._control_hit("nmt-state", node, said)
         elif (
             command is not None
             and state != command[1]
@@ -326,7 +317,7 @@ class BusEvents:
         ):
             names = nmt_state_name(state), nmt_state_name(command[1])
             said = f"still {names[0]} {ms_text(at_us - command[0])} ms after the command to be"
-            self._hit("nmt-state", node, ident, f"{said} {names[1]}")
+            self._control_hit("nmt-state", node, f"{said} {names[1]}")
             one.command = None
 
     def _guarding(self, node: int, one: NodeEvents) -> None:
@@ -340,10 +331,8 @@ class BusEvents:
             toggle = self._bus.payload[row] & _TOGGLE
             if toggle == before:
                 self._row = row
-                self._hit(
-                    *("guard-toggle", node, nmt.ERROR_CONTROL_COB_ID + node),
-                    "the toggle bit is the same as in the answer before",
-                )
+                said = "the toggle bit is the same as in the answer before"
+                self._control_hit("guard-toggle", node, said)
             before = toggle
 
     # SDO
@@ -361,10 +350,8 @@ class BusEvents:
             and data[:4] == latest[1][:4]
             and at_us - latest[0] <= PAIR_US
         ):
-            self._hit(
-                *("doubled-node", node, sdo_frame.RESPONSE_COB_ID + node),
-                "two answers to one SDO request: two nodes have this node-ID",
-            )
+            said = "two answers to one SDO request: two nodes have this node-ID"
+            self._hit("doubled-node", node, sdo_frame.RESPONSE_COB_ID + node, said)
 
     def _transfer(self, at_us: int, transfer: decoded.Transfer) -> None:
         """Judge a completed SDO transfer."""
@@ -456,13 +443,6 @@ def _sends(ident: int) -> bool:
 def is_event(ident: int) -> bool:
     """Return whether each frame of an identifier is processed individually."""
     can_id = ident & ~REMOTE
-    return bool(ident & ERROR and not ident >> 30) or (
-        can_id <= STANDARD_MAX
-        and (
-            can_id == nmt.NMT_COB_ID
-            or can_id in EMCY_IDS
-            or can_id in RESPONSE_IDS
-            or can_id in REQUEST_IDS
-            or can_id in ERROR_CONTROL_IDS
-        )
-    )
+    services = (EMCY_IDS, RESPONSE_IDS, REQUEST_IDS, ERROR_CONTROL_IDS)
+    is_service = can_id == nmt.NMT_COB_ID or any(can_id in ids for ids in services)
+    return is_service or bool(ident & ERROR and not ident >> 30)
