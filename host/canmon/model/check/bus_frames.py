@@ -212,14 +212,11 @@ class FrameKeeper:
             self._extend(frames)
             return
         for record in frames:
-            self._add(record)
-
-    def _add(self, record: Record) -> None:
-        self.frames += 1
-        bus = self.buses.get(record.channel)
-        if bus is None:
-            bus = self.buses[record.channel] = BusFrames(record.channel)
-        bus.add(record, self.frames)
+            self.frames += 1
+            bus = self.buses.get(record.channel)
+            if bus is None:
+                bus = self.buses[record.channel] = BusFrames(record.channel)
+            bus.add(record, self.frames)
 
     def _extend(self, columns: Columns) -> None:
         if not len(columns):
