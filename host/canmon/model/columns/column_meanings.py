@@ -231,10 +231,10 @@ def _error_control(
         each.append(rows)
         return []
     bus.guard(node, requested=requested)
-    both = (
-        (rows[guarded == one], partial(_error_control_state, node, one)) for one in (False, True)
-    )
-    return [_Alike(*one) for one in both]
+    return [
+        _Alike(rows[guarded == one], partial(_error_control_state, node, one))
+        for one in (False, True)
+    ]
 
 
 def _error_control_state(node: int, guarded: bool, at_us: int, frame: CanFrame) -> Decoded:

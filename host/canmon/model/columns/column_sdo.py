@@ -454,14 +454,9 @@ class ColumnSdo:
 
     def _write_opened(self, dialogue: _Frames, rows: Ints, texts: cells.Texts) -> None:
         """Write the answers after which segments follow."""
-        parts = (
-            dialogue.node[rows],
-            dialogue.word[rows],
-            dialogue.word[rows + 1],
-            dialogue.place[rows + 1],
-        )
-        for *key, place in zip(*(part.tolist() for part in parts), strict=True):
-            node, request, answer = key
+        words, places = dialogue.word, dialogue.place
+        parts = dialogue.node[rows], words[rows], words[rows + 1], places[rows + 1]
+        for node, request, answer, place in zip(*(one.tolist() for one in parts), strict=True):
             told = "opened", node, request, answer
             if told not in self._texts:
                 channel = SdoChannel(node)
