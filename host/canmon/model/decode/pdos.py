@@ -168,9 +168,8 @@ _PREDEFINED: Final = 4
 """Number of PDOs per direction that have a CAN-ID in the pre-defined connection set."""
 PDO_OBJECTS: Final = range(0x1400, 0x1C00)
 
-_TPDO, _RPDO = "tpdo", "rpdo"
-_INDICES: Final = {_TPDO: (0x1800, 0x1A00, 0x180), _RPDO: (0x1400, 0x1600, 0x200)}
-"""First communication parameter, first mapping, and pre-defined CAN-ID of PDO 1, by direction."""
+_DIRECTIONS: Final = {False: ("tpdo", 0x1800, 0x180), True: ("rpdo", 0x1400, 0x200)}
+"""Name, communication parameter and pre-defined CAN-ID of PDO 1, by whether the node receives."""
 
 _Layout = PdoDecoder | _MpdoLayout
 
@@ -185,12 +184,12 @@ class NodePdo(NamedTuple):
     @property
     def kind(self) -> str:
         """Kind as in `Decoded.kind`."""
-        return f"{_RPDO if self.receives else _TPDO}{self.number}"
+        return f"{_DIRECTIONS[self.receives][0]}{self.number}"
 
     @property
     def parameter(self) -> int:
         """The index of the PDO's communication parameter."""
-        return _INDICES[_RPDO if self.receives else _TPDO][0] + self.number - 1
+        return _DIRECTIONS[self.receives][1] + self.number - 1
 
     @property
     def mapping(self) -> int:
@@ -241,13 +240,12 @@ def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
 
 def can_id_of(pdo: NodePdo, memory: NodeMemory) -> int | None:
     """Return the CAN-ID of a PDO, or None if it is not valid or not known."""
-    predefined = _INDICES[_RPDO if pdo.receives else _TPDO][2]
     cob_id = memory.number(pdo.parameter, 1)
     if cob_id is not None:
         return None if cob_id & (INVALID | EXTENDED) else cob_id & CAN_ID_MASK
     if pdo.number > _PREDEFINED:
         return None
-    return predefined + 0x100 * (pdo.number - 1) + pdo.node
+    return _DIRECTIONS[pdo.receives][2] + 0x100 * (pdo.number - 1) + pdo.node
 
 
 def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
