@@ -17,10 +17,11 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer, TransferOutcome, write_entry
 from tickrig.host.canmon.model.decode.node_memory import Entry, NodeMemory, ObjectText
+from tickrig.host.canmon.model.decode.pdos import mapped_objects
 from tickrig.host.canmon.model.frames import s_text
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 from tickrig.wire.canopen.sdo_frame import describe_abort
 from tickrig.wire.errors import FieldError
 
@@ -140,9 +141,7 @@ class NodeDictionary:
         """Return the objects that a PDO carries, by the names that the decoder uses."""
         index = _MAPPINGS[kind[:4]] + int(kind[4:]) - 1
         count = min(self.memory.number(index, 0) or 0, MAX_MAPPED_OBJECTS)
-        found = (
-            MappedObject.parse(self.memory.number(index, sub + 1) or 0) for sub in range(count)
-        )
+        found = mapped_objects(self.memory, index, count)
         entries = ((one.index, one.sub) for one in found)
         return {self.memory.describe(*one).name or write_entry(one): one for one in entries}
 
