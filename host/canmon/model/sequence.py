@@ -21,7 +21,6 @@ import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
 from typing import Any, Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded
@@ -436,7 +435,7 @@ def parse_lines(text: str, file: str) -> Sequence:
     whole = _FrameStep(place=(1,), times=times, steps=tuple(steps))
     if times == FOREVER and not whole.takes_time:
         raise StepError(f"{file}:1: loop forever takes no time: write +10 before a frame")
-    return Sequence((whole,), partial(_place, file))
+    return Sequence((whole,), lambda place: f"{file}:{place[0]}")
 
 
 def _times(word: str, *, first: bool) -> int:
@@ -456,18 +455,6 @@ def _line(content: str, number: int) -> _FrameStep:
     frame = CanFrame.parse(match[2])
     return _FrameStep(place=(number,), at_us=round(float(match[1]) * 1_000), what=(frame,))
 
-
-def _place(file: str, place: Place) -> str:
-    return f"{file}:{place[0]}"
-
-
-_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "send": (),
-    "wait": (),
-    "expect": ("within", "on-fail"),
-    "repeat": ("steps",),
-}
-"""Kinds of steps, and the further keys that each kind allows."""
 
 _WITHIN: Final = "1s"
 """Time limit of an expectation that gives none."""
@@ -545,14 +532,15 @@ class TomlSequence:
         return tuple(self._step(step, (*path, number)) for number, step in enumerate(value))
 
     def _step(self, step: dict[str, Any], path: Place) -> _FrameStep:
-        verbs = [key for key in step if key in _KEYS]
+        verbs = [key for key in step if key in _VERBS]
         if len(verbs) != 1:
             came = " and ".join(verbs) or ", ".join(step) or "nothing"
-            raise _Wrong(path, f"a step has one of {', '.join(_KEYS)}; this one has {came}")
+            raise _Wrong(path, f"a step has one of {', '.join(_VERBS)}; this one has {came}")
         verb = verbs[0]
-        _check_keys(step, (verb, *_KEYS[verb]), path)
+        read, keys = _VERBS[verb]
+        _check_keys(step, (verb, *keys), path)
         try:
-            return _READERS[verb](self, step, path)
+            return read(self, step, path)
         except (ValueError, WireError) as error:
             raise _Wrong((*path, verb), str(error)) from None
 
@@ -607,12 +595,13 @@ class TomlSequence:
 
 
 _Reader = Callable[[TomlSequence, dict[str, Any], Place], _FrameStep]
-_READERS: Final[Mapping[str, _Reader]] = {
-    "send": TomlSequence._send,
-    "wait": TomlSequence._wait,
-    "expect": TomlSequence._expect,
-    "repeat": TomlSequence._repeat,
+_VERBS: Final[Mapping[str, tuple[_Reader, tuple[str, ...]]]] = {
+    "send": (TomlSequence._send, ()),
+    "wait": (TomlSequence._wait, ()),
+    "expect": (TomlSequence._expect, ("within", "on-fail")),
+    "repeat": (TomlSequence._repeat, ("steps",)),
 }
+"""Readers of the kinds of steps, and the further keys that each kind allows."""
 
 
 def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], path: Place) -> None:
