@@ -122,34 +122,10 @@ _COLUMNS: Final = (
 )
 
 
-class _IdText(NamedTuple):
-    """The leading column, with the bus if there are several, and the identifier.
-
-    Attributes:
-        channel_width: number of characters for the bus, or 0 for none.
-    """
-
-    channel_width: int
-
-    @property
-    def width(self) -> int:
-        """The width of the column in characters."""
-        return self.channel_width + (1 if self.channel_width else 0) + 9
-
-    def of(self, row: traffic.IdRow) -> str:
-        """Return the text of a row."""
-        return self._joined(row.channel, ident_text(row.ident))
-
-    def title(self) -> str:
-        """Return the title of the column."""
-        return self._joined("bus", "CAN-ID")
-
-    def _joined(self, channel: str, ident: str) -> str:
-        channel = in_cells(channel)
-        return (
-            f"{channel:<{self.channel_width}.{self.channel_width}} " * bool(self.channel_width)
-            + f"{ident:<9}"
-        )
+def _ids(channel: str, ident: str, width: int) -> str:
+    """Return the first cells of a line. Without a width, the bus is left out."""
+    bus = f"{in_cells(channel):<{width}.{width}} " if width else ""
+    return f"{bus}{ident:<{_ID_WIDTH}}"
 
 
 def _fitting(width: int) -> tuple[_TopColumn, ...]:
@@ -253,6 +229,7 @@ def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]
 
 # The table of all identifiers that `canmon top` paints, driven by frames, keys and the time.
 
+_ID_WIDTH: Final = 9
 _DATA_WIDTH: Final = 23
 _HEAT_WIDTH: Final = 71
 _MEANING_WIDTH: Final = 50
@@ -368,7 +345,7 @@ class _Table(NamedTuple):
     """The parts of the rows that fit the screen.
 
     Attributes:
-        ids: leading column with the identifiers.
+        bus_width: width of the names of buses in characters, or 0 to leave them out.
         columns: columns of numbers.
         text: function that writes the last cell of a row.
         title: title of this cell.
@@ -377,7 +354,7 @@ class _Table(NamedTuple):
         width: width of the screen in characters.
     """
 
-    ids: _IdText
+    bus_width: int
     columns: tuple[_TopColumn, ...]
     text: Callable[[traffic.IdRow, bool], str]
     title: str
@@ -388,23 +365,24 @@ class _Table(NamedTuple):
     def of(cls, snapshot: traffic.TrafficSnapshot, view: TableView, width: int) -> _Table:
         """Choose the columns that fit."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
-        ids = _IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
+        bus_width = min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0
         text, title, payload_width = _payload(view)
-        room = width - ids.width - payload_width - 1
+        room = width - len(_ids("", "", bus_width)) - payload_width - 1
         columns = _fitting(room)
         fits = room >= sum(column.width + 1 for column in columns)
         styled = view.styled and fits and (view.bits or view.meaning is None)
-        return cls(ids, columns, text, title, styled, width)
+        return cls(bus_width, columns, text, title, styled, width)
 
     def titles(self) -> str:
         """Return the line with the titles."""
         cells = [f"{column.title:>{column.width}}" for column in self.columns]
-        return " ".join([self.ids.title(), *cells, self.title])[: self.width]
+        return " ".join([_ids("bus", "CAN-ID", self.bus_width), *cells, self.title])[: self.width]
 
     def line(self, row: traffic.IdRow, now_us: int) -> str:
         """Return the line of a row."""
         cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
-        line = " ".join([self.ids.of(row), *cells, self.text(row, self.styled)])
+        ids = _ids(row.channel, ident_text(row.ident), self.bus_width)
+        line = " ".join([ids, *cells, self.text(row, self.styled)])
         return (line if self.styled else line[: self.width]).rstrip()
 
 
