@@ -29,7 +29,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final, NamedTuple, assert_never
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import (
@@ -326,7 +326,9 @@ STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
 """Formats in the order in which a key shows them."""
 
 
-def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
+def stamp_text(
+    stamp: Stamp, at_us: int, origin_us: int, before_us: int, digits: tuple[int, int] = (1, 1)
+) -> str:
     """Return a time as text.
 
     Args:
@@ -334,19 +336,20 @@ def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
         at_us: time to write.
         origin_us: time of the first frame.
         before_us: time of the previous item.
+        digits: least number of digits before the point, of a time and of a span.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
     """
     match stamp:
         case Stamp.DELTA:
-            return seconds_text(at_us - before_us, 1)
+            return seconds_text(at_us - before_us, digits[1])
         case Stamp.ABSOLUTE:
-            return seconds_text(at_us, 1)
+            return seconds_text(at_us, digits[0])
         case Stamp.DATE:
             return date_text(at_us)
         case _:
-            return seconds_text(at_us - origin_us, 1)
+            return seconds_text(at_us - origin_us, digits[1])
 
 
 class DumpLines:
@@ -388,17 +391,7 @@ class DumpLines:
         if self.first_us is None:
             self.first_us = self.last_us = at_us
         last_us, self.last_us = self.last_us, at_us
-        match self.form:
-            case Stamp.ABSOLUTE:
-                return f" ({seconds_text(at_us, 10)})"
-            case Stamp.DATE:
-                return f" ({date_text(at_us)})"
-            case Stamp.ZERO:
-                return f" ({seconds_text(at_us - self.first_us, 3)})"
-            case Stamp.DELTA:
-                return f" ({seconds_text(at_us - last_us, 3)})"
-            case _:
-                assert_never(self.form)
+        return f" ({stamp_text(self.form, at_us, self.first_us, last_us, (10, 3))})"
 
 
 def _flags(frame: AnyFrame) -> str:
