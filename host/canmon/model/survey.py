@@ -71,17 +71,13 @@ class TimeBins(Generic[_Key]):
         if not shift:
             return
         self.width_us <<= shift
-        for key, spans in self.sums.items():
-            merged: dict[int, int] = {}
-            for place, amount in spans.items():
-                merged[place >> shift] = merged.get(place >> shift, 0) + amount
-            self.sums[key] = merged
-        for name, ranges in self.ranges.items():
-            joined: dict[int, tuple[float, float]] = {}
-            for place, (low, high) in ranges.items():
-                was = joined.get(place >> shift, (low, high))
-                joined[place >> shift] = min(was[0], low), max(was[1], high)
-            self.ranges[name] = joined
+        sums, ranges, self.sums, self.ranges = self.sums, self.ranges, {}, {}
+        for key, amounts in sums.items():
+            for place, amount in amounts.items():
+                self.add_at(key, place >> shift, amount)
+        for key, spans in ranges.items():
+            for place, (low, high) in spans.items():
+                self.spread_at(key, place >> shift, low, high)
 
     def add(self, key: _Key, at_us: int, amount: int) -> None:
         """Add an amount to the span that contains a time."""
