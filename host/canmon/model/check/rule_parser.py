@@ -119,15 +119,7 @@ class _SliceParser(FilterParser):
     def _plain_term(self) -> filters.Test:
         if not self._is_slice():
             return super()._plain_term()
-        name = self._slice()
-        self._signals.add(name)
-        if self._next.text not in filters.COMPARISONS:
-            return filters.signal_test(name)
-        sign, value = self._comparison(name)
-        if filters.number(value) is None:
-            raise self._error(f"{value!r} is no number")
-        del self._tokens[0]
-        return filters.signal_test(name, sign, value)
+        return self._compared(self._slice(), ())
 
     def _is_slice(self) -> bool:
         word, column = self._next

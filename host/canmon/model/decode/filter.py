@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -498,20 +498,20 @@ class FilterParser:
         return self.wrong(self._text, self._next.column, reason)
 
     def _or(self) -> Test:
-        tests = [self._and()]
-        while self._take("or", ","):
-            tests.append(self._and())
-        if len(tests) == 1:
-            return tests[0]
-        return lambda record, decoded: any(test(record, decoded) for test in tests)
+        return self._joined(any, self._and, "or", ",")
 
     def _and(self) -> Test:
-        tests = [self._not()]
-        while self._take("and"):
-            tests.append(self._not())
+        return self._joined(all, self._not, "and")
+
+    def _joined(
+        self, holds: Callable[[Iterable[bool]], bool], term: Callable[[], Test], *words: str
+    ) -> Test:
+        tests = [term()]
+        while self._take(*words):
+            tests.append(term())
         if len(tests) == 1:
             return tests[0]
-        return lambda record, decoded: all(test(record, decoded) for test in tests)
+        return lambda record, decoded: holds(test(record, decoded) for test in tests)
 
     def _not(self) -> Test:
         if self._next.text not in ("not", "!", "("):
@@ -649,14 +649,18 @@ class FilterParser:
         if node is not None and node not in _RANGES["node"]:
             raise self._error(f"{node} is no node-ID 1 to {_HIGHEST_NODE}")
         del self._tokens[0]
-        self._signals.add(word)
+        return self._compared(word, _EQUALITIES)
+
+    def _compared(self, name: str, with_words: Collection[str]) -> Test:
+        """Read the comparison of a signal, if there is one. Some signs also compare words."""
+        self._signals.add(name)
         if self._next.text not in COMPARISONS:
-            return signal_test(word)
-        sign, value = self._comparison(word)
-        if number(value) is None and sign not in _EQUALITIES:
+            return signal_test(name)
+        sign, value = self._comparison(name)
+        if number(value) is None and sign not in with_words:
             raise self._error(f"{value!r} is no number")
         del self._tokens[0]
-        return signal_test(word, sign, value)
+        return signal_test(name, sign, value)
 
 
 def _hexadecimal(text: str) -> int | None:
