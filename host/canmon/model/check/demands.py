@@ -501,11 +501,12 @@ class _DeadlineDemand(RuleDemand):
 
     def begin(self, at_us: int) -> None:
         """Begin without an open deadline."""
-        self._close_all()
+        self.pause()
 
     def pause(self) -> None:
         """Stop waiting for frames."""
-        self._close_all()
+        self._open.clear()
+        self.due_us = NEVER
 
     def expire(self) -> Iterable[RuleBreach]:
         """Report frames that have not arrived."""
@@ -526,10 +527,6 @@ class _DeadlineDemand(RuleDemand):
             self.judged = True
             dues = (self._due(record) for record, _ in self._open.values())
             self.due_us = min(dues, default=NEVER)
-
-    def _close_all(self) -> None:
-        self._open.clear()
-        self.due_us = NEVER
 
     def _due(self, record: Record) -> int:
         return record.at_us + self._most_us
