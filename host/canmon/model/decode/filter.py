@@ -458,6 +458,9 @@ class FilterParser:
 
     Args:
         text: text of the filter.
+
+    Attributes:
+        words: words that were read and that no built-in decoder produces, as in `Filter.words`.
     """
 
     wrong = FilterError
@@ -465,7 +468,7 @@ class FilterParser:
     def __init__(self, text: str) -> None:
         self._text = text
         self._signals: set[str] = set()
-        self._words: set[tuple[str, str]] = set()
+        self.words: set[tuple[str, str]] = set()
         self._nodes: set[range] = set()
         if len(text) > _LONGEST:
             raise self.wrong(text, _LONGEST, f"it has {len(text)} characters, at most {_LONGEST}")
@@ -476,12 +479,7 @@ class FilterParser:
         test = self._or()
         if self._next.text:
             raise self._error(f"{self._next.text!r} after the end; join terms by 'and' or 'or'")
-        return Filter(self._text, test, frozenset(self._signals), self.words)
-
-    @property
-    def words(self) -> frozenset[tuple[str, str]]:
-        """Words that were read and that no built-in decoder produces, as in `Filter.words`."""
-        return frozenset(self._words)
+        return Filter(self._text, test, frozenset(self._signals), frozenset(self.words))
 
     @property
     def _next(self) -> Token:
@@ -619,7 +617,7 @@ class FilterParser:
                 if meant or name not in _FREE:
                     said = f"{name} is never {value!r}, but {', '.join(words)}"
                     raise self._error(said + "".join(meant))
-                self._words.add((name, value))
+                self.words.add((name, value))
             del self._tokens[0]
             return _word_test(name, sign, value)
         wanted = _hexadecimal(value) if name == "id" else number(value)
