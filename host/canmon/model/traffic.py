@@ -424,12 +424,13 @@ class ErrorStatistics:
         self._frames += 1
         kind = can.describe_error_frame(frame)
         self._kinds[kind] = self._kinds.get(kind, 0) + 1
-        state = _state_after(frame)
+        controller = frame.error_class & can.ErrorClass.CONTROLLER
+        flags = frame.data[can.CONTROLLER_BYTE] if controller else 0
+        state = _state_after(frame.error_class, flags)
         self._state = self._state if state is None else state
         if frame.error_class & can.ErrorClass.COUNTERS:
             self._tec, self._rec = frame.data[can.TEC_BYTE], frame.data[can.REC_BYTE]
-        if _is_overflow(frame):
-            self._overflows += 1
+        self._overflows += bool(flags & _OVERFLOW)
 
     def row(self) -> _ErrorRow:
         """Return the statistics of the error frames."""
@@ -439,22 +440,13 @@ class ErrorStatistics:
         )
 
 
-def _is_overflow(frame: can.ErrorFrame) -> bool:
-    """Return whether the local controller lost frames."""
-    return bool(
-        frame.error_class & can.ErrorClass.CONTROLLER
-        and frame.data[can.CONTROLLER_BYTE] & _OVERFLOW
-    )
-
-
-def _state_after(frame: can.ErrorFrame) -> can.ErrorState | None:
+def _state_after(error_class: int, flags: int) -> can.ErrorState | None:
     """Return the state of the local controller after an error frame, or None if it is unknown."""
-    if frame.error_class & can.ErrorClass.BUS_OFF:
+    if error_class & can.ErrorClass.BUS_OFF:
         return can.ErrorState.BUS_OFF
-    flags = frame.data[can.CONTROLLER_BYTE] if frame.error_class & can.ErrorClass.CONTROLLER else 0
     if flags & _PASSIVE:
         return can.ErrorState.PASSIVE
-    if flags & can.ControllerFlag.ACTIVE or frame.error_class & can.ErrorClass.RESTARTED:
+    if flags & can.ControllerFlag.ACTIVE or error_class & can.ErrorClass.RESTARTED:
         return can.ErrorState.ACTIVE
     return None
 
@@ -514,7 +506,7 @@ class Load:
             self._open = BusSecond(begin_us, before + bits)
             return None
         ended = self._ended = self._open
-        self._peak = _busier(self._peak, ended)
+        self._peak = max(self._peak, ended, key=lambda second: second.bits)
         self._open = BusSecond(_window_begin(self._first_us, at_us), bits)
         return ended
 
@@ -528,7 +520,7 @@ class Load:
         return _LoadRow(
             self._bits,
             self._latest(now_us),
-            _busier(self._peak, self._open),
+            max(self._peak, self._open, key=lambda second: second.bits),
             self._bits * 1_000_000 // (windows * WINDOW_US),
         )
 
@@ -543,11 +535,6 @@ class Load:
 def _window_begin(first_us: int, at_us: int) -> int:
     """Return the start of the window that contains a time."""
     return at_us - (at_us - first_us) % WINDOW_US
-
-
-def _busier(first: BusSecond, second: BusSecond) -> BusSecond:
-    """Return the window with more bits, or the first window if the bits are equal."""
-    return second if second.bits > first.bits else first
 
 
 class BusRow(NamedTuple):
