@@ -29,9 +29,9 @@ from tickrig.host.canmon.model.columns.columns import (
     by_channel,
     grown,
     records,
-    split_errors,
+    select,
 )
-from tickrig.host.canmon.model.frames import REMOTE
+from tickrig.host.canmon.model.frames import ERROR, REMOTE
 from tickrig.host.canmon.model.traffic import EXACT_US, SUB_BITS, Gaps
 from tickrig.wire import can
 from tickrig.wire.can import CanFrame, ErrorFrame
@@ -370,10 +370,12 @@ class _ColumnBus:
         """Count frames. There is at least one frame."""
         self._went_back += int(np.count_nonzero(np.diff(frames.at_us, prepend=self._last_us) < 0))
         self._last_us = int(frames.at_us[-1])
-        errors, frames = split_errors(frames)
-        for record in records(errors):
-            assert isinstance(record.frame, ErrorFrame)
-            self._errors.take(record.frame)
+        errors = frames.ident & ERROR != 0
+        if errors.any():
+            for record in records(select(frames, np.flatnonzero(errors))):
+                assert isinstance(record.frame, ErrorFrame)
+                self._errors.take(record.frame)
+            frames = select(frames, np.flatnonzero(~errors))
         if len(frames):
             self._take_frames(frames)
 

@@ -21,7 +21,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.frames import ERROR, Record, flagged_id, frame_of
+from tickrig.host.canmon.model.frames import Record, flagged_id, frame_of
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.traffic import WINDOW_US, BusSecond, Load
 from tickrig.wire.can import ErrorFrame, FdFrame
@@ -152,14 +152,6 @@ def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
         return [(columns.channels[present[0]], np.arange(len(columns)), columns)]
     rows = {columns.channels[place]: np.flatnonzero(columns.channel == place) for place in present}
     return [(channel, rows[channel], select(columns, rows[channel])) for channel in sorted(rows)]
-
-
-def split_errors(columns: Columns) -> tuple[Columns, Columns]:
-    """Return the error frames, and the other frames."""
-    errors = columns.ident & ERROR != 0
-    if not errors.any():
-        return select(columns, np.empty(0, np.int64)), columns
-    return select(columns, np.flatnonzero(errors)), select(columns, np.flatnonzero(~errors))
 
 
 def records(columns: Columns) -> list[Record]:
