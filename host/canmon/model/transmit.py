@@ -509,7 +509,9 @@ def parse_row_text(text: str) -> RowText:
         if name == word:
             frame.append(word)
         elif name in found:
-            found[name].append(_value(word, next(words, None)))
+            if (value := next(words, None)) is None:
+                raise ValueError(f"{word} says nothing")
+            found[name].append(value)
         else:
             raise ValueError(f"no {word!r} here; known: --{', --'.join(_OPTIONS)}")
     if not frame:
@@ -523,12 +525,6 @@ def parse_row_text(text: str) -> RowText:
         tuple(found["checksum"]),
         _one("name", found["name"]),
     )
-
-
-def _value(option: str, word: str | None) -> str:
-    if word is None:
-        raise ValueError(f"{option} says nothing")
-    return word
 
 
 def _one(name: str, words: list[str]) -> str:
