@@ -75,9 +75,8 @@ class ColumnChecker(RuleCheck):
         for channel, rows, frames in by_channel(columns):
             if self._load is not None:
                 placed += self._too_busy(channel, rows, frames)
-            places, gaps = self._selections.setdefault(channel, _BusSelection(self._made)).take(
-                frames
-            )
+            selection = self._selections.setdefault(channel, _BusSelection(self._made))
+            places, gaps = selection.take(frames)
             found.append(rows[places])
             gaps_us.append(gaps)
             self._last_us = int(columns.at_us[-1])
