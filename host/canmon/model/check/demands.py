@@ -596,19 +596,6 @@ class Answered(_DeadlineDemand):
 _EMCY: Final = "emcy"
 
 
-@dataclass(frozen=True, slots=True)
-class Values:
-    """A set of valid values.
-
-    Attributes:
-        text: text of the set in the rule.
-        holds: function that returns whether a signal has one of the values.
-    """
-
-    text: str
-    holds: Callable[[Signal], bool]
-
-
 class In(RuleDemand):
     """Demand that a value is one of the valid values.
 
@@ -617,12 +604,13 @@ class In(RuleDemand):
 
     Args:
         event: signal, or kind of frames. For a kind of frames, the first value counts.
-        values: set of valid values.
+        values: text of the set of valid values in the rule.
+        holds: function that returns whether a signal has one of the values.
     """
 
-    def __init__(self, event: RuleEvent, values: Values) -> None:
-        self._event, self._value_of, self._values = event, event.value_of(), values
-        self._once = event.is_signal
+    def __init__(self, event: RuleEvent, values: str, holds: Callable[[Signal], bool]) -> None:
+        self._event, self._value_of, self._once = event, event.value_of(), event.is_signal
+        self._values, self._holds = values, holds
         self.doubt = f"no value of {event.text} came while it was in force"
         self._wrong: set[_Sender] = set()
 
@@ -637,13 +625,13 @@ class In(RuleDemand):
             return None
         self.judged = True
         sender = _sender_of(record)
-        if self._values.holds(signal) or (decoded.kind == _EMCY and not signal.value):
+        if self._holds(signal) or (decoded.kind == _EMCY and not signal.value):
             self._wrong.discard(sender)
             return None
         if self._once and sender in self._wrong:
             return None
         self._wrong.add(sender)
-        return f"{_said(decoded)}; {self._event.text} in {self._values.text} is right"
+        return f"{_said(decoded)}; {self._event.text} in {self._values} is right"
 
 
 class Follow(RuleDemand):

@@ -646,9 +646,8 @@ class NoSdoAbort(_CanopenRule):
         side = "server" if frame.can_id in _ANSWER_IDS else "client"
         reason = sdo_frame.describe_abort(int.from_bytes(data[4:], "little"))
         if len(data) < sdo_frame.FRAME_BYTES:
-            reason = (
-                f"without a whole abort code ({len(data)} B, {sdo_frame.FRAME_BYTES} are right)"
-            )
+            right = f"{len(data)} B, {sdo_frame.FRAME_BYTES} are right"
+            reason = f"without a whole abort code ({right})"
         node = frame.can_id & _NODE_MASK
         return f"node {node}: {side} aborts {which}, {reason}"
 

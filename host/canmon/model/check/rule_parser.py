@@ -42,11 +42,16 @@ from tickrig.host.text.values import parse_time_us
 class RuleScope:
     """The scope of a rule, which determines whether the rule applies.
 
+    Args:
+        word: word before the event.
+        event: event that bounds the scope.
+
     Attributes:
         text: text of the scope.
     """
 
-    text = ""
+    def __init__(self, word: str, event: demands.RuleEvent) -> None:
+        self._event, self.text = event, f"{word} {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Process a frame. Return whether the rule judges it."""
@@ -56,36 +61,30 @@ class RuleScope:
 class _After(RuleScope):
     """Scope that begins with the first frame after an event."""
 
-    def __init__(self, event: demands.RuleEvent) -> None:
-        self._event, self._came, self.text = event, False, f"after {event.text}"
+    _came = False
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Return True once the event has occurred. The event itself is not judged."""
         came = self._came
-        if not came:
-            self._came = self._event.matches(record, decoded)
+        self._came = came or self._event.matches(record, decoded)
         return came
 
 
-class _Before(RuleScope):
+class _Before(_After):
     """Scope that ends with an event."""
-
-    def __init__(self, event: demands.RuleEvent) -> None:
-        self._event, self._came, self.text = event, False, f"before {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Return True until the event occurs. The event itself is not judged."""
-        if not self._came:
-            self._came = self._event.matches(record, decoded)
+        self._came = self._came or self._event.matches(record, decoded)
         return not self._came
 
 
 class _While(RuleScope):
     """Scope in which a condition on signals is true, by the latest frame with such a signal."""
 
-    def __init__(self, event: demands.RuleEvent) -> None:
-        self._event, self._carries, self.text = event, event.carriers(), f"while {event.text}"
-        self._true: dict[str, bool] = {}
+    def __init__(self, word: str, event: demands.RuleEvent) -> None:
+        super().__init__(word, event)
+        self._carries, self._true = event.carriers(), dict[str, bool]()
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Return True from the frame that makes the condition true."""
@@ -420,13 +419,13 @@ class _QuantityParser(_SliceParser):
             raise self._error("the time before '..' is above the one behind it")
         return low_us, high_us
 
-    def _values(self) -> demands.Values:
+    def _values(self) -> tuple[str, Callable[[Signal], bool]]:
         """Read the allowed values, such as `{1, 8130h, 5..9, stopped}`, or `1..5` alone."""
         begin = self._next.column - 1
         parts = [self._value()] if not self._take("{") else self._members()
         text = self._text[begin : self._next.column - 1].strip()
         try:
-            return demands.Values(text, _values_of(parts))
+            return text, _values_of(parts)
         except ValueError as error:
             raise self._error(str(error)) from None
 
@@ -499,7 +498,7 @@ DEMANDS: Final = (
     *("never", "always", "once", "at most", "at least", "in", "every", "within", "to"),
     *("answered", "dlc", "toggle", "counts", "steps", "changes"),
 )
-_SCOPE: Final[dict[str, Callable[[demands.RuleEvent], RuleScope]]] = {
+_SCOPE: Final[dict[str, type[RuleScope]]] = {
     "after": _After,
     "before": _Before,
     "while": _While,
@@ -552,7 +551,8 @@ class _RuleParser(_QuantityParser):
         demand = self._demand(self._subject())
         scopes = []
         while word := self._take_one(*SCOPES):
-            scopes.append(_SCOPE[word](self._condition() if word == "while" else self._event()))
+            event = self._condition() if word == "while" else self._event()
+            scopes.append(_SCOPE[word](word, event))
         if self._next.text:
             raise self._error(
                 f"{self._came()} behind the end; wanted {', '.join(SCOPES)}, or no more"
@@ -641,7 +641,7 @@ class _RuleParser(_QuantityParser):
             raise self._refuse_word(reason)
         match word:
             case "in":
-                return demands.In(event, self._values())
+                return demands.In(event, *self._values())
             case "steps":
                 self._expect("under")
                 return demands.Steps(event, self._number())
