@@ -221,11 +221,11 @@ def _error_control(
     remote = frames.ident[rows] & np.uint32(REMOTE) != 0
     boots = (frames.payload[rows] == 0) & (frames.dlc[rows] == 1) & ~remote
     requested = bool(remote[-1])
-    if not bus.guarding(node) and not remote.any():
+    if node not in bus.guarded and not remote.any():
         each.append(rows[boots])
         return [_Alike(rows[~boots], partial(_error_control_state, node, False))]
     guarded = np.empty(len(rows), np.bool_)
-    guarded[0], guarded[1:] = bus.guarding(node), remote[:-1]
+    guarded[0], guarded[1:] = node in bus.guarded, remote[:-1]
     guarded &= bus.answers_guarding(node)
     if (boots & ~guarded).any():
         each.append(rows)

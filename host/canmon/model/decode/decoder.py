@@ -136,6 +136,7 @@ class BusDecoder:
         changes: number of possible changes of the meaning of a CAN-ID.
         renamed: number of possible changes of the description of an object.
         sdo_moved: whether an SDO CAN-ID of the pre-defined connection set got another meaning.
+        guarded: nodes whose next frame of error control answers a guarding request.
     """
 
     def __init__(
@@ -148,7 +149,7 @@ class BusDecoder:
         self._files, self._channel = files, channel
         self._memories: dict[int, node_memory.NodeMemory] = {}
         self._channels: dict[tuple[int, int], SdoChannel] = {}
-        self._guarded: set[int] = set()
+        self.guarded: set[int] = set()
         self._pdos = PdoTable()
         self._configured: dict[int, Route] = {}
         self._routes: dict[int, Route] = {}
@@ -211,10 +212,6 @@ class BusDecoder:
             return None
         return int(route.args[0])
 
-    def guarding(self, node: int) -> bool:
-        """Return whether the next frame of error control of a node answers a guarding request."""
-        return node in self._guarded
-
     def answers_guarding(self, node: int) -> bool:
         """Return whether a node answers guarding requests.
 
@@ -225,9 +222,9 @@ class BusDecoder:
     def guard(self, node: int, *, requested: bool) -> None:
         """Record whether the last frame of error control of a node was a guarding request."""
         if requested:
-            self._guarded.add(node)
+            self.guarded.add(node)
         else:
-            self._guarded.discard(node)
+            self.guarded.discard(node)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the running SDO transfers."""
@@ -277,7 +274,7 @@ class BusDecoder:
         return partial(self._sdo, node, take)
 
     def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
-        guarded = node in self._guarded and self.answers_guarding(node)
+        guarded = node in self.guarded and self.answers_guarding(node)
         decoded = services.decode_error_control(node, frame, guarded=guarded)
         self.guard(node, requested=frame.remote)
         if decoded.kind == "boot-up" and self.memory(node).boot():
