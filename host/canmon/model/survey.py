@@ -411,7 +411,6 @@ class Piece(Protocol):
 class _Excerpt:
     """The frames around one of the frames."""
 
-    number: int
     records: list[Record]
     wanted: int
 
@@ -446,7 +445,7 @@ def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> di
             records = head + piece.cut(begin, min(end, size))
             found[number] = passed + begin + 1 - len(head), records
             if end > size:
-                running.append(_Excerpt(number, records, end - size))
+                running.append(_Excerpt(records, end - size))
         if not order and not running:
             break
         before = (before + piece.cut(max(0, size - frames), size))[-frames:] if frames else []
