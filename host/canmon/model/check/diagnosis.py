@@ -50,7 +50,6 @@ from tickrig.host.canmon.model.check.bus_frames import (
 from tickrig.host.canmon.model.check.rule import ONE_TIME
 from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.pdos import PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, FD, REMOTE, Record, ident_text, ms_text, node_of
 from tickrig.host.text.values import counted
 from tickrig.wire.can import STANDARD_MAX, CanFrame, frame_bits
@@ -453,8 +452,8 @@ class _BusJudge:
     ) -> None:
         """Find the frames of a PDO whose length differs from that of most frames."""
         usual = sizes.most_common(1)[0][0]
-        layout = getattr(decoder.bus(self._bus.name).lasting(ident), "__self__", None)
-        if isinstance(layout, PdoDecoder) and usual < layout.size:
+        layout = decoder.bus(self._bus.name).layout(ident)
+        if layout and usual < layout.size:
             text = f"{_name(ident)} has {usual} B, {layout.size} are right by its mapping"
             self._hit("pdo-length", ident, text, rows[: learnt.KEPT_FRAMES], sizes[usual])
         if len(sizes) == 1:
@@ -661,10 +660,9 @@ class _BusJudge:
         for ident, rows in sorted(self._rows.items()):
             if ident not in node_events.PDO_IDS:
                 continue
-            route = decoder.bus(self._bus.name).lasting(ident)
-            layout = getattr(route, "__self__", None)
+            layout = decoder.bus(self._bus.name).layout(ident)
             shift = None
-            if isinstance(layout, PdoDecoder) and layout.fields:
+            if layout and layout.fields:
                 if not layout.kind.startswith("tpdo"):
                     continue
                 words = [one for one in layout.fields if one.name == "statusword"]

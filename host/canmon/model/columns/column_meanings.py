@@ -169,9 +169,9 @@ class ColumnMeanings:
             elif len(rows) < _FEW:
                 each.append(rows)
             elif route := bus.lasting(number):
-                layout = getattr(route, "__self__", None)
+                layout = bus.layout(number)
                 remote = frames.ident[rows] & np.uint32(REMOTE) != 0
-                if isinstance(layout, PdoDecoder) and not remote.any():
+                if layout and not remote.any():
                     lengths = frames.dlc[rows].astype(np.int64)
                     write = self._pdo(layout)
                     write(texts, places[rows], frames.payload[rows], lengths)

@@ -259,12 +259,8 @@ class ColumnSurvey:
 def _layouts(bus: BusDecoder, frames: Columns) -> dict[int, PdoDecoder]:
     """Return the PDOs among the CAN-IDs of frames, with their current mapping."""
     can_ids = np.flatnonzero(np.bincount((frames.ident & np.uint32(STANDARD_MAX)).astype(np.int64)))
-    found = {}
-    for can_id in can_ids.tolist():
-        layout = getattr(bus.lasting(can_id), "__self__", None)
-        if isinstance(layout, PdoDecoder) and layout.fields:
-            found[can_id] = layout
-    return found
+    layouts = ((can_id, bus.layout(can_id)) for can_id in can_ids.tolist())
+    return {can_id: layout for can_id, layout in layouts if layout and layout.fields}
 
 
 def _values(one: Field, payloads: npt.NDArray[np.uint64]) -> _Values | None:

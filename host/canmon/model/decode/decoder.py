@@ -186,8 +186,13 @@ class BusDecoder:
         """
         route = self._routed(can_id)
         told = route.func if isinstance(route, partial) else route
-        mapped = isinstance(getattr(route, "__self__", None), PdoDecoder)
-        return route if mapped or told in (_unmapped, _emcy, _raw, *_PRE_DEFINED.values()) else None
+        by_frame = told in (_unmapped, _emcy, _raw, *_PRE_DEFINED.values())
+        return route if by_frame or self.layout(can_id) is not None else None
+
+    def layout(self, can_id: int) -> PdoDecoder | None:
+        """Return the decoder of a CAN-ID if it is that of a PDO, but not of a multiplexed one."""
+        layout = getattr(self._routed(can_id), "__self__", None)
+        return layout if isinstance(layout, PdoDecoder) else None
 
     @property
     def version(self) -> int:
