@@ -303,7 +303,7 @@ class Survey(NodeBoard):
         kind, node, channel = decoded.kind, decoded.node, record.channel
         since_us = self.since(record.at_us)
         row = None if node is None else self.row(channel, node)
-        told_us, late = (None, 0) if row is None else (row.reported_us, row.late)
+        told_us, late = (None, 0) if row is None else (row.heartbeats.last_us, row.late)
         if row and kind == "boot-up":
             late -= row.is_late(record.at_us)  # the board counts a late heartbeat alone
         super().take(record, decoded)
@@ -350,8 +350,9 @@ class Survey(NodeBoard):
     def end(self) -> None:
         """Process the end of the log. Heartbeats that were due by then are missing."""
         for row in self.rows():
-            if row.reported_us is not None and row.is_late(self.last_us):
-                self._gap(row.channel, row.node, row.reported_us, self.last_us)
+            reported_us = row.heartbeats.last_us
+            if reported_us is not None and row.is_late(self.last_us):
+                self._gap(row.channel, row.node, reported_us, self.last_us)
 
     def _gap(self, channel: str, node: int, from_us: int, to_us: int) -> None:
         begin_us = self.since(from_us)

@@ -319,12 +319,12 @@ def _of_node(diagnosis: Diagnosis, row: NodeStatus, rule: str) -> list[BusFault]
 
 def _heartbeat(row: NodeStatus, gaps: Thinned[Mark], diagnosis: Diagnosis) -> str:
     if _of_node(diagnosis, row, "doubled-node"):  # their gaps give the period of neither
-        return FROM_TWO_NODES if row.reported_us is not None else ""
-    if row.period_us is None:
+        return FROM_TWO_NODES if row.heartbeats.last_us is not None else ""
+    if row.heartbeats.period_us is None:
         return ""
-    filed = not row.learnt and not row.memory.was_received(HEARTBEAT_TIME)
+    filed = not row.heartbeats.learnt and not row.memory.was_received(HEARTBEAT_TIME)
     late = f", late {counted(gaps.count, 'time')}" if gaps.count else ""
-    return f"{row.period_us / 1e3:g} ms{_FROM_EDS * filed}{late}"
+    return f"{row.heartbeats.period_us / 1e3:g} ms{_FROM_EDS * filed}{late}"
 
 
 def _gaps(

@@ -421,9 +421,8 @@ class _Watched:
         self.judged |= since_us >= period_us
         if not beats.is_late(at_us):
             return None
-        learnt = beats.gaps and not beats.by_sdo
         period = f"{ms_text(period_us)} ms"
-        says = f"one each {period} before" if learnt else f"its 1017h says {period}"
+        says = f"one each {period} before" if beats.learnt else f"its 1017h says {period}"
         return f"{self._name}: no heartbeat for {ms_text(since_us)} ms, {says}"
 
     @property

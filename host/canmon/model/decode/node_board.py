@@ -91,6 +91,7 @@ class NodeStatus:
         name: device name that the node reported.
         present: whether the node has sent a frame that is known to be its own.
         pdos: latest frame of each PDO of the node, by kind.
+        heartbeats: heartbeats of the node, and their period.
         doubled: whether two nodes have this node-ID, according to heartbeats and boot-ups. The row
             then mixes both nodes, and the gaps do not give a period.
     """
@@ -114,7 +115,7 @@ class NodeStatus:
     pdos: dict[str, Decoded] = field(default_factory=dict)
     doubled: bool = False
     _reset_requested: bool = False
-    _heartbeats: Heartbeats = field(init=False)
+    heartbeats: Heartbeats = field(init=False)
     _beats_us: deque[int] = field(default_factory=lambda: deque(maxlen=_BEATS_KEPT))
     _each_us: int = 0  # the period of each of two nodes
     _alike: int = 0  # gaps in a row that are as long as the one before
@@ -122,37 +123,23 @@ class NodeStatus:
 
     def __post_init__(self) -> None:
         """Prepare for the first heartbeat."""
-        self._heartbeats = Heartbeats(self.memory)
+        self.heartbeats = Heartbeats(self.memory)
 
     @property
     def known_name(self) -> str:
         """Name that the node reported, or else the name in its EDS file."""
         return self.name or self.memory.eds.name
 
-    @property
-    def period_us(self) -> int | None:
-        """The heartbeat period as known to `Heartbeats`, or None without a period."""
-        return self._heartbeats.period_us
-
-    @property
-    def learnt(self) -> bool:
-        """Whether the period is learnt from the gaps."""
-        return bool(self._heartbeats.gaps) and not self._heartbeats.by_sdo
-
-    @property
-    def reported_us(self) -> int | None:
-        """Time of the last reported state."""
-        return self._heartbeats.last_us
-
     def age_us(self, now_us: int) -> int | None:
         """Return the time since the last reported state."""
-        return None if self.reported_us is None else now_us - self.reported_us
+        last_us = self.heartbeats.last_us
+        return None if last_us is None else now_us - last_us
 
     def is_late(self, now_us: int) -> bool:
         """Return whether a heartbeat is missing."""
         if self._each_us:
             return now_us - self._beats_us[-1] > LATE * self._each_us
-        return self._heartbeats.is_late(now_us)
+        return self.heartbeats.is_late(now_us)
 
     @property
     def state_text(self) -> str:
@@ -177,13 +164,13 @@ class NodeStatus:
         self._each_us = self._alike = 0
         self.unrequested_boots += self.present and not self._reset_requested
         self._reset_requested, self.drive_state, self.error_code = False, "", 0
-        self._heartbeats.boot(at_us)
+        self.heartbeats.boot(at_us)
         self._report(NmtState.PRE_OPERATIONAL)
 
     def heartbeat(self, at_us: int, state: int) -> None:
         """Process a heartbeat, or the answer to a guarding request."""
         self.late += self.is_late(at_us)
-        self._heartbeats.take(at_us)
+        self.heartbeats.take(at_us)
         self._count_heartbeat(at_us)
         self._report(state)
 
@@ -220,7 +207,7 @@ class NodeStatus:
             self.sdo_errors += 1
             self.sdo_error = str(transfer)
         elif transfer.entry == HEARTBEAT_TIME:
-            self._heartbeats.learn(at_us, transfer)
+            self.heartbeats.learn(at_us, transfer)
         elif transfer.entry == _DEVICE_NAME and isinstance(transfer.value, str):
             self.name = transfer.value
 
@@ -376,16 +363,16 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
 
 def _heartbeat(row: NodeStatus, now_us: int) -> str:
     """Return age, period, and the elapsed part of one and a half periods as text."""
-    age_us, period_us = row.age_us(now_us), row.period_us
+    age_us, period_us = row.age_us(now_us), row.heartbeats.period_us
     if age_us is None:
-        return "never seen" if row.period_us else ""
+        return "never seen" if period_us else ""
     if row.doubled:
         return FROM_TWO_NODES + " LATE" * row.is_late(now_us)
     if period_us is None:
         return f"{age_us // 1_000} ms ago"
     share = min(_BAR_CELLS, age_us * _BAR_CELLS * 2 // (3 * period_us))
     bar = "#" * share + "." * (_BAR_CELLS - share)
-    about = "~" if row.learnt else ""
+    about = "~" if row.heartbeats.learnt else ""
     words = [f"{bar} {age_us // 1_000}/{about}{period_us // 1_000} ms"]
     words += ["LATE"] if row.is_late(now_us) else []
     words += [f"late so far: {row.late}"] if row.late else []
@@ -425,7 +412,7 @@ def _cut(line: str, width: int) -> str:
 
 
 def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
-    age_us, period_us = row.age_us(now_us), row.period_us
+    age_us, period_us = row.age_us(now_us), row.heartbeats.period_us
     return {
         "v": _VERSION,
         "ev": "node",
@@ -435,7 +422,7 @@ def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
         "name": row.known_name,
         "state": row.state_text,
         "heartbeat_ms": None if period_us is None or row.doubled else period_us / 1_000,
-        "learnt": row.learnt,
+        "learnt": row.heartbeats.learnt,
         "doubled": row.doubled,
         "age_ms": None if age_us is None else age_us / 1_000,
         "late": row.is_late(now_us),

@@ -470,6 +470,11 @@ class Heartbeats:
         return self.memory.was_received(HEARTBEAT_TIME)
 
     @property
+    def learnt(self) -> bool:
+        """Whether the period is learnt from the gaps."""
+        return bool(self.gaps) and not self.by_sdo
+
+    @property
     def period_us(self) -> int | None:
         """The period from 1017h in traffic, or else the measured period, or that of the EDS."""
         if self.gaps and not self.by_sdo:

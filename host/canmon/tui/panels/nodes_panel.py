@@ -149,7 +149,7 @@ def _state(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     """Return the age of the heartbeat as numbers and as a bar that is full after a period."""
-    age_us, period_us = row.age_us(now_us), row.period_us
+    age_us, period_us = row.age_us(now_us), row.heartbeats.period_us
     if age_us is None:
         return plain("never seen", BAD) if period_us else ()
     if row.doubled:
@@ -160,7 +160,7 @@ def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     full = min(cells, max(0, age_us) * cells // period_us)
     late = row.is_late(now_us)
     style = BAD if late else WARNING if age_us > period_us else "green"
-    about = "~" if row.learnt else ""
+    about = "~" if row.heartbeats.learnt else ""
     age = f"{age_us // 1_000}" if age_us < 10_000_000 else f"{age_us // 1_000_000} s"
     text = f" {age}/{about}{period_us // 1_000} ms" + " LATE" * late
     bar = (FULL * full, style), (EMPTY * (cells - full), _DIM)

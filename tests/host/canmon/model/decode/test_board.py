@@ -74,7 +74,7 @@ def test_a_pdo_at_its_pre_defined_can_id_is_hearing_its_node(can_id: str) -> Non
 def test_the_period_of_a_heartbeat_is_learnt() -> None:
     board = beats(0, 100, 200, 300)
     (row,) = board.rows()
-    assert (row.period_us, row.learnt) == (100_000, True)
+    assert (row.heartbeats.period_us, row.heartbeats.learnt) == (100_000, True)
     assert "##... 80/~100 ms" in render_board(board, 380_000, WIDE, 10)[1]
 
 
@@ -85,7 +85,7 @@ def test_heartbeats_of_one_time_are_no_period() -> None:
 
 def test_the_period_of_a_heartbeat_is_known_by_1017h() -> None:
     row = status("605#2B171000C8000000 585#6017100000000000 705#05 705#05")
-    assert (row.period_us, row.learnt) == (200_000, False)
+    assert (row.heartbeats.period_us, row.heartbeats.learnt) == (200_000, False)
 
 
 def test_a_heartbeat_that_is_missing_is_late() -> None:
@@ -138,12 +138,12 @@ def test_an_emcy_is_kept_when_the_error_is_gone() -> None:
 
 def test_a_heartbeat_time_of_0_by_sdo_means_none_and_by_an_eds_nothing() -> None:
     told = "705#05 705#05 585#4B17100000000000"
-    assert status(told).period_us is None
+    assert status(told).heartbeats.period_us is None
     decoder = Decoder({5: EdsObjects(values={(0x1017, 0): bytes(2)})})
     board = NodeBoard(decoder, {5: ""})
     for record in trace("705#05 705#05"):
         board.take(record, decoder.take(record))
-    assert board.rows()[0].period_us == STEP_US
+    assert board.rows()[0].heartbeats.period_us == STEP_US
 
 
 def test_the_state_of_a_drive_is_read_by_sdo_as_well() -> None:
