@@ -206,9 +206,8 @@ class Count(RuleDemand):
         self._count, self.came = self._count + 1, True
         if self._most is None or self._count != self._most + 1:
             return None
-        return (
-            f"{self._event.text} came {counted(self._count, 'time')}, at most {self._most} is right"
-        )
+        came = f"{self._event.text} came {counted(self._count, 'time')}"
+        return f"{came}, at most {self._most} is right"
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
         """Report too few frames."""

@@ -402,10 +402,7 @@ class _Watched:
         said = self.overdue(at_us)
         if beats.by_sdo or len(beats.gaps) >= _SURE_GAPS:
             return said
-        if not beats.gaps:
-            doubted, self._doubted = self._doubted, said
-        else:
-            doubted, self._doubted = self._doubted, None
+        doubted, self._doubted = self._doubted, None if beats.gaps else said
         keeps_eds = beats.since_us is not None and at_us - beats.since_us <= (
             _LOST_AFTER * self._eds_us
         )
@@ -485,13 +482,10 @@ class NoLostHeartbeat(Rule):
         for _, node in sorted(self._nodes.items()):
             if (text := node.overdue(end_us)) is not None:
                 yield text
-        begin_us = end_us if self._begin_us is None else self._begin_us
+        since_us = 0 if self._begin_us is None else end_us - self._begin_us
         for node_id, period_ms in sorted(self._periods_ms.items()):
-            if (
-                not self._is_watched(node_id)
-                and end_us - begin_us > _LOST_AFTER * period_ms * 1_000
-            ):
-                since = ms_text(end_us - begin_us)
+            if not self._is_watched(node_id) and since_us > _LOST_AFTER * period_ms * 1_000:
+                since = ms_text(since_us)
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
