@@ -295,10 +295,8 @@ class _BusJudge:
             events = self._walk(None)
         decoder, self._events = self._decoder, events
         if not canopen:
-            self.unjudged = (
-                dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen traffic was found")
-                | self.unjudged
-            )
+            why = dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen traffic was found")
+            self.unjudged = why | self.unjudged
             return self._grouped(events.hits)
         events.end(self._end_us)
         self._cuts = sorted(events.cuts)
@@ -478,9 +476,8 @@ class _BusJudge:
             odd = unknown
             text = f"the length of {_name(ident)} changes from {lengths[odd[0] - 1]} to"
             text += f" {lengths[odd[0]]} B"
-        self._hit(
-            "pdo-length", ident, text, [rows[at] for at in odd[: learnt.KEPT_FRAMES]], len(odd)
-        )
+        shown = [rows[at] for at in odd[: learnt.KEPT_FRAMES]]
+        self._hit("pdo-length", ident, text, shown, len(odd))
 
     # Rhythms
 
@@ -872,9 +869,8 @@ def _plain(values: Any) -> list[int]:
 
 
 def _has_rhythm(ident: int) -> bool:
-    return ident in (node_events.SYNC_ID, node_events.TIME_ID) or any(
-        ident in ids for ids in (node_events.PDO_IDS, node_events.ERROR_CONTROL_IDS)
-    )
+    once = ident in (node_events.SYNC_ID, node_events.TIME_ID)
+    return once or ident in node_events.PDO_IDS or ident in node_events.ERROR_CONTROL_IDS
 
 
 def _name(ident: int) -> str:
