@@ -297,16 +297,12 @@ def number(text: str) -> float | None:
         return int(match[1] + match[2], 16)
     if not text.isascii() or "_" in text:
         return None
-    for kind in (_whole, float):
+    for read in (lambda digits: int(digits, 0), float):
         try:
-            return kind(text)
+            return read(text)
         except ValueError:
             continue
     return None
-
-
-def _whole(text: str) -> int:
-    return int(text, 0)
 
 
 def comparison(sign: str, text: str) -> Callable[[Signal], bool]:

@@ -96,12 +96,12 @@ class ObjectText(NamedTuple):
             sized: whether the transfer indicated the number of bytes. If not, surplus bytes have no
                 meaning. If so, surplus bytes are dropped only if they are padding.
         """
-        size = 0 if self.kind is None else self.kind.size
-        if not 0 < size < len(data):
+        kind = self.kind
+        if kind is None or not 0 < kind.size < len(data):
             return data
-        value, rest = data[:size], data[size:]
-        fill = b"\xff" if self.kind and self.kind.signed and value[-1] >> 7 else b"\0"
-        filled = self.kind is not None and self.kind.is_integer and rest == fill * len(rest)
+        value, rest = data[: kind.size], data[kind.size :]
+        fill = b"\xff" if kind.signed and value[-1] >> 7 else b"\0"
+        filled = kind.is_integer and rest == fill * len(rest)
         return value if filled or not sized else data
 
     def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
