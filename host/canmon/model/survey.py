@@ -10,10 +10,10 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final, Generic, NamedTuple, Protocol, TypeVar
+from typing import Final, Generic, NamedTuple, TypeVar
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, Transfer, TransferOutcome
 from tickrig.host.canmon.model.decode.decoder import Decoder
@@ -398,16 +398,6 @@ class Survey(NodeBoard):
 # The frames around some moments, out of a log that is read a second time.
 
 
-class Piece(Protocol):
-    """A range of successive frames of a log."""
-
-    def __len__(self) -> int:
-        """Return the number of frames."""
-
-    def cut(self, begin: int, end: int, /) -> list[Record]:
-        """Return some of the frames by their positions."""
-
-
 @dataclass(slots=True)
 class _Excerpt:
     """The frames around one of the frames."""
@@ -416,11 +406,13 @@ class _Excerpt:
     wanted: int
 
 
-def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> dict[int, _Frames]:
+def excerpts(
+    pieces: Iterable[Sequence[Record]], numbers: Iterable[int], frames: int
+) -> dict[int, _Frames]:
     """Return the frames around given frames.
 
     Args:
-        pieces: all frames of a log.
+        pieces: all frames of a log, in successive pieces.
         numbers: positions of the given frames in the log, from 1.
         frames: number of frames before and after each given frame.
 
@@ -435,7 +427,7 @@ def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> di
     for piece in pieces:
         size = len(piece)
         for one in running:
-            one.records += piece.cut(0, min(one.wanted, size))
+            one.records += piece[: one.wanted]
             one.wanted -= min(one.wanted, size)
         running = [one for one in running if one.wanted]
         while order and order[0] <= passed + size:
@@ -443,13 +435,13 @@ def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> di
             row = number - 1 - passed
             begin, end = max(0, row - frames), row + frames + 1
             head = before[-(frames - row) :] if row < frames else []
-            records = head + piece.cut(begin, min(end, size))
+            records = [*head, *piece[begin:end]]
             found[number] = passed + begin + 1 - len(head), records
             if end > size:
                 running.append(_Excerpt(records, end - size))
         if not order and not running:
             break
-        before = (before + piece.cut(max(0, size - frames), size))[-frames:] if frames else []
+        before = [*before, *piece[-frames:]][-frames:] if frames else []
         passed += size
     return found
 

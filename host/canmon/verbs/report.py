@@ -21,7 +21,7 @@ from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.survey import Piece, Survey, excerpts
+from tickrig.host.canmon.model.survey import Survey, excerpts
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.output import listening, report_page
 from tickrig.host.canmon.sources.source import (
@@ -326,11 +326,11 @@ class _Reading:
         """Close the open files."""
         self.source.close()
 
-    def _pieces(self) -> Iterator[Piece]:
+    def _pieces(self) -> Iterator[Sequence[Record]]:
         source = open_source(self._words, self._bus, self._cut)
         with closing(source):
             while not source.ended:
-                yield _FramePiece(source.poll(0))
+                yield source.poll(0)
 
     @staticmethod
     def _record(
@@ -347,21 +347,6 @@ class _Reading:
                 listening.listen(source, take, span_us)
         finally:
             writer.close()
-
-
-class _FramePiece:
-    """Frames of a log, of which some are wanted."""
-
-    def __init__(self, frames: Sequence[Record]) -> None:
-        self._frames = frames
-
-    def __len__(self) -> int:
-        """Return the number of frames."""
-        return len(self._frames)
-
-    def cut(self, begin: int, end: int, /) -> list[Record]:
-        """Return some of the frames by their positions."""
-        return list(self._frames[begin:end])
 
 
 def _in_columns(decoder: Decoder) -> bool:
