@@ -327,6 +327,13 @@ class Survey(NodeBoard):
             assert isinstance(state, int)
             self.lanes[channel, node].states.take(since_us, nmt_state_name(state))
 
+    def follow(self, record: Record) -> None:
+        """Decode a frame, count it, and add its events and values."""
+        decoded = self._decoder.take(record)
+        self.count(record)
+        self.take(record, decoded)
+        self.take_signals(record, decoded)
+
     def take_signals(self, record: Record, decoded: Decoded) -> None:
         """Add the values of a PDO, or of a message of a DBC file."""
         if not decoded.signals or not (decoded.kind == "dbc" or "pdo" in decoded.kind):

@@ -274,10 +274,7 @@ def _list(
 
             def take(records: Sequence[Record]) -> None:
                 for record in records:
-                    survey.count(record)
-                    decoded = decoder.take(record)
-                    survey.take(record, decoded)
-                    survey.take_signals(record, decoded)
+                    survey.follow(record)
 
             follow(frames, [source], take, request.span_us)
         click.echo("\n".join(_tree(survey)))

@@ -230,14 +230,10 @@ class _Seen:
 
     def by_frames(self, source: Source) -> None:
         """Process a log frame by frame."""
-        survey = self.survey
 
         def take(records: Sequence[Record]) -> None:
             for record in records:
-                decoded = self.decoder.take(record)
-                survey.count(record)
-                survey.take(record, decoded)
-                survey.take_signals(record, decoded)
+                self.survey.follow(record)
             self._diagnoser.take(records)
 
         with listening.until_interrupted():
