@@ -642,10 +642,8 @@ class CanLogWriter:
         """End the log."""
         if not self._closed:
             self._closed = True
-            try:
+            with self._file:
                 self._writer.stop()
-            finally:
-                self._file.close()
 
     def messages(self) -> list[str]:
         """Report the items that the format could not hold."""

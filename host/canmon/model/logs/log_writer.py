@@ -146,10 +146,8 @@ class TextLogWriter:
     def close(self) -> None:
         """End the log."""
         if not self._file.closed:
-            try:
+            with self._file:
                 self._give()
-            finally:
-                self._file.close()
 
     def messages(self) -> list[str]:
         """Return no messages, because these formats hold all items."""

@@ -558,13 +558,11 @@ class PcapngWriter:
         """End the capture. Marks after the last frame go into statistics of the first bus."""
         if self._file.closed:
             return
-        try:
+        with self._file:
             if self._comments and self._interfaces:
                 content = _STATISTICS.pack(0, self._at_us >> 32, self._at_us & _LOW)
                 self._blocks.append(_block(_STATISTICS_BLOCK, content + self._comments + _END))
             self._give()
-        finally:
-            self._file.close()
 
     def messages(self) -> list[str]:
         """Return no messages, because a capture holds all items."""

@@ -61,11 +61,9 @@ class TraceLogWriter:
     def close(self) -> None:
         """End the trace."""
         if not self._file.closed:
-            try:
+            with self._file:
                 if self._channel:
                     self._put(BenchRecord(self._latest_us, "", Mark.END).encode())
-            finally:
-                self._file.close()
 
     def messages(self) -> list[str]:
         """Report the items that were left out."""
