@@ -107,8 +107,7 @@ class _AscLines:
         try:
             return self._event(event, tally)
         except WireError:
-            tally.passed_over[log_file.BAD_FRAMES] += 1
-            return log_file.BAD_FRAMES
+            return tally.pass_over(log_file.BAD_FRAMES)
         except (ValueError, LookupError):
             return None
 
@@ -157,13 +156,12 @@ class _AscLines:
             fd = kind.upper() == "CANFD"
             frame_or_none = (self._fd if fd else self._xl)(words.split())
             if frame_or_none is None:
-                tally.passed_over[log_file.CAN_XL] += 1
-                return log_file.CAN_XL
+                return tally.pass_over(log_file.CAN_XL)
             return self._record(channel, direction, frame_or_none)
         if _FRAME.match(event):
             return None
         if not _QUIET_EVENT.match(event):
-            tally.passed_over[log_file.OTHER_LINES] += 1
+            tally.pass_over(log_file.OTHER_LINES)
             _note_errors(event, tally)
         return event
 

@@ -50,7 +50,7 @@ def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | N
     try:
         at_us = log_file.to_us(message.timestamp)
     except ValueError:
-        tally.passed_over[NO_TIME] += 1
+        tally.pass_over(NO_TIME)
         return None
     if (error := to_error_frame(message)) is not None:
         return Record(at_us, channel, error, not message.is_rx)
@@ -59,7 +59,7 @@ def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | N
     try:
         return Record(at_us, channel, frame.checked(), not message.is_rx)
     except WireError:
-        tally.passed_over[BAD_FRAMES] += 1
+        tally.pass_over(BAD_FRAMES)
     return None
 
 

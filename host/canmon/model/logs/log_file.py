@@ -214,6 +214,11 @@ class LogTally:
     errors_told: Counter[str] = field(default_factory=Counter)
     without_errors: str = ""
 
+    def pass_over(self, what: str) -> str:
+        """Count an item that is no frame. Return what it is."""
+        self.passed_over[what] += 1
+        return what
+
     @property
     def unread(self) -> int:
         """Number of lines and frames that arrived and were not returned."""

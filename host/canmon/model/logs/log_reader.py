@@ -160,8 +160,7 @@ def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record
     ident, size, shown = data
     digits = size[1:-1]
     if len(digits) > len("08"):
-        tally.passed_over[CAN_XL] += 1
-        return CAN_XL
+        return tally.pass_over(CAN_XL)
     length = int(digits) if size.startswith("[") else min(int(digits, 16), MAX_DATA_BYTES)
     flags = f"#{BRS * (brs == 'B') | ESI * (esi == 'E')}" * (len(digits) == len("08"))
     try:
@@ -192,8 +191,7 @@ def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record
     frames, and frames that python-can prints.
     """
     if _SERIAL.fullmatch(text):
-        tally.passed_over[SERIAL_LINES] += 1
-        return SERIAL_LINES
+        return tally.pass_over(SERIAL_LINES)
     if text.startswith(DROP_COUNT) and (lost := _lost_frames(text)):
         tally.lost += lost
         return text
@@ -323,8 +321,7 @@ def _logged(match: re.Match[str], tally: LogTally) -> Record | str | None:
     """Return the frame of a line of `candump -L`."""
     seconds, fraction, channel, notation, direction = match.groups()
     if _XL.fullmatch(notation):
-        tally.passed_over[CAN_XL] += 1
-        return CAN_XL
+        return tally.pass_over(CAN_XL)
     at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
     try:
         return Record(at_us, channel, parse_frame(notation), direction == "T")

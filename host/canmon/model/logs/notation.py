@@ -115,7 +115,7 @@ def _event(said: dict[str, Any], tally: log_file.LogTally) -> str:
     if said["ev"] == log_file.DROP:
         tally.lost += max(0, int(said["n"]))
     elif said["ev"] == _LINE_EVENT:
-        tally.passed_over[log_file.SERIAL_LINES] += 1
+        tally.pass_over(log_file.SERIAL_LINES)
     return str(said["ev"])
 
 
@@ -263,8 +263,7 @@ def _of_savvycan(match: re.Match[str], tally: log_file.LogTally, clock: _Countin
 def _dumped(match: re.Match[str], tally: log_file.LogTally) -> Record | str:
     stamp, channel, ident, direction, data = match.groups()
     if not ident:
-        tally.passed_over[log_file.SERIAL_LINES] += 1
-        return log_file.SERIAL_LINES
+        return tally.pass_over(log_file.SERIAL_LINES)
     return Record(
         log_file.to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx"
     )

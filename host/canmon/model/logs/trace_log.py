@@ -115,7 +115,7 @@ class TraceLogReader:
                     if isinstance(record.traffic, CanFrame):
                         yield from passed.take(record, record.traffic)
                     elif record.traffic:
-                        self.tally.passed_over[log_file.SERIAL_LINES] += 1
+                        self.tally.pass_over(log_file.SERIAL_LINES)
         except (EOFError, zlib.error, TraceError) as error:
             raise log_file.LogError(f"{self._path}: {error}") from error
         except UnicodeDecodeError:

@@ -108,8 +108,7 @@ class _TrcLines:
         try:
             return self._row(number, words, tally)
         except WireError:
-            tally.passed_over[log_file.BAD_FRAMES] += 1
-            return log_file.BAD_FRAMES
+            return tally.pass_over(log_file.BAD_FRAMES)
         except (ValueError, LookupError):
             return None
 
@@ -130,8 +129,7 @@ class _TrcLines:
         kind = row.cells.get("T", "Rx")
         what = log_file.NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
         if what:
-            tally.passed_over[what] += 1
-            return what
+            return tally.pass_over(what)
         is_error = kind in _ERRORS or row.data[:1] == [ERROR]
         frame = _error(row) if is_error else _frame(row, kind)
         sent = "Tx" in (kind, row.cells.get("d"))
