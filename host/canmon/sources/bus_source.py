@@ -18,7 +18,7 @@ from typing import Any, Final
 import can
 from can.util import load_config
 
-from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.frames import EXTENDED, REMOTE, Record
 from tickrig.host.canmon.model.logs.can_log import channel_name, to_record
 from tickrig.host.canmon.model.logs.log_file import CAN_XL, LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
@@ -40,8 +40,6 @@ _CAN_RAW_FD_FRAMES: Final = 5
 _CAN_RAW_XL_FRAMES: Final = 7
 
 
-_EXTENDED: Final = 0x8000_0000
-_REMOTE: Final = 0x4000_0000
 _STANDARD_MASK: Final = 0x7FF
 _FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame, linux/can.h
 _FD_FRAME: Final = struct.Struct("=IBB2x64s")  # struct canfd_frame
@@ -113,7 +111,7 @@ class SocketReader:
         if len(data) == _FRAME.size:
             return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
         if data[_FLAGS_AT] & _XL_FLAG or len(data) != _FD_BYTES:
-            self.tally.passed_over[CAN_XL] += 1
+            self.tally.pass_over(CAN_XL)
             return ()
         return (Record(at_us, self.name, _fd_frame(*_FD_FRAME.unpack(data)), sent),)
 
@@ -125,7 +123,7 @@ def _let_fd(bus: Any) -> None:
 
 
 def _fd_frame(flagged: int, length: int, flags: int, data: bytes) -> FdFrame:
-    extended = bool(flagged & _EXTENDED)
+    extended = bool(flagged & EXTENDED)
     can_id = flagged & (ERROR_CLASS_MASK if extended else _STANDARD_MASK)
     return FdFrame(can_id, data[:length], extended, flags & (BRS | ESI)).checked()
 
@@ -133,7 +131,7 @@ def _fd_frame(flagged: int, length: int, flags: int, data: bytes) -> FdFrame:
 def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:
     if flagged & ERROR_FLAG:
         return ErrorFrame(flagged & ERROR_CLASS_MASK, data)
-    extended, remote = bool(flagged & _EXTENDED), bool(flagged & _REMOTE)
+    extended, remote = bool(flagged & EXTENDED), bool(flagged & REMOTE)
     can_id = flagged & (ERROR_CLASS_MASK if extended else _STANDARD_MASK)
     if remote:
         return CanFrame(can_id, b"", True, extended, min(length, 8))

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO, Final, NamedTuple, cast
+from typing import BinaryIO, Final, Literal, NamedTuple, cast
 
-from tickrig.host.canmon.model.frames import AnyFrame, Record
+from tickrig.host.canmon.model.frames import EXTENDED, REMOTE, AnyFrame, Record
 from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import Item
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
@@ -96,8 +96,6 @@ def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
 _LINK_TYPE: Final = 227
 """Number of LINKTYPE_CAN_SOCKETCAN."""
 
-_EXTENDED: Final = 0x8000_0000
-_REMOTE: Final = 0x4000_0000
 _FDF: Final = 0x4
 """Flag of a packet that is a CAN FD frame, however short it was cut."""
 _XL: Final = 0x80
@@ -117,11 +115,11 @@ _DATA_AT: Final = 8
 def packet(frame: AnyFrame) -> bytes:
     """Return a frame as the data of a packet: 16 bytes, or 72 bytes for CAN FD."""
     if isinstance(frame, can.FdFrame):
-        flagged = frame.can_id | _EXTENDED * frame.extended
+        flagged = frame.can_id | EXTENDED * frame.extended
         return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
     if isinstance(frame, can.ErrorFrame):
         return _CLASSIC.pack(can.ERROR_FLAG | frame.error_class, len(frame.data), frame.data)
-    flagged = frame.can_id | _EXTENDED * frame.extended | _REMOTE * frame.remote
+    flagged = frame.can_id | EXTENDED * frame.extended | REMOTE * frame.remote
     return _CLASSIC.pack(flagged, frame.dlc, frame.data)
 
 
@@ -133,9 +131,9 @@ def _parse_packet(data: bytes) -> AnyFrame | str | None:
     content = data[_DATA_AT : _DATA_AT + length]
     if flagged & can.ERROR_FLAG:
         return can.ErrorFrame(flagged & can.ERROR_CLASS_MASK, content[:8].ljust(8, b"\0"))
-    extended = bool(flagged & _EXTENDED)
+    extended = bool(flagged & EXTENDED)
     can_id = flagged & (can.EXTENDED_MAX if extended else can.STANDARD_MAX)
-    if flagged & _REMOTE:
+    if flagged & REMOTE:
         return can.CanFrame(can_id, b"", True, extended, min(length, can.MAX_DATA_BYTES))
     # Older captures leave the flags empty: then the size of the structure tells CAN FD.
     is_fd = flags & _FDF or len(data) == _FD_BYTES
@@ -319,7 +317,7 @@ class _PcapngReader:
             elif kind == _STATISTICS_BLOCK:
                 self._comment(options(order, content[12:]), records)
         except struct.error:
-            self._tally.passed_over[_BAD_PACKETS] += 1
+            self._tally.pass_over(_BAD_PACKETS)
 
     def _add_interface(self, content: bytes) -> None:
         link_type, _, snap = struct.unpack_from(f"{self._order}HHI", content)
@@ -353,29 +351,27 @@ class _PcapngReader:
         A packet without a time has the time of the previous packet.
         """
         if number >= len(self._interfaces) or size > len(data):
-            self._tally.passed_over[_BAD_PACKETS] += 1
+            self._tally.pass_over(_BAD_PACKETS)
             return
         where = self._interfaces[number]
         if not where.is_can:
-            self._tally.passed_over[log_file.OTHER_PACKETS] += 1
+            self._tally.pass_over(log_file.OTHER_PACKETS)
             return
-        told = dict(options(self._order, data[size + -size % 4 :]))
-        drops = int.from_bytes(
-            told.get(_DROP_COUNT, b""), "little" if self._order == "<" else "big"
-        )
+        given = list(options(self._order, data[size + -size % 4 :]))
+        byte_order: Literal["little", "big"] = "little" if self._order == "<" else "big"
+        numbers = {code: int.from_bytes(value, byte_order) for code, value in given}
         if count is not None:
             self._at_us = max(0, count * _MICROS // where.parts + where.offset_us)
-        self._drop(drops, records)
-        self._comment(options(self._order, data[size + -size % 4 :]), records)
+        self._drop(numbers.get(_DROP_COUNT, 0), records)
+        self._comment(given, records)
         if self._at_us >= _END_US:
-            self._tally.passed_over[log_file.NO_TIME] += 1
+            self._tally.pass_over(log_file.NO_TIME)
             return
         frame = _parse_packet(data[:size])
         if frame is None or isinstance(frame, str):
-            self._tally.passed_over[frame or _BAD_PACKETS] += 1
+            self._tally.pass_over(frame or _BAD_PACKETS)
             return
-        flags = told.get(_PACKET_FLAGS, b"")
-        sent = int.from_bytes(flags, "little" if self._order == "<" else "big") & _DIRECTION
+        sent = numbers.get(_PACKET_FLAGS, 0) & _DIRECTION
         records.append(Record(self._at_us, where.name, frame, sent == _OUTBOUND))
 
     def _drop(self, frames: int, records: list[Item]) -> None:
@@ -384,7 +380,7 @@ class _PcapngReader:
         if frames and self._marks:
             records.append(log_file.dropped(self._at_us, frames))
 
-    def _comment(self, given: Iterator[tuple[int, bytes]], records: list[Item]) -> None:
+    def _comment(self, given: Iterable[tuple[int, bytes]], records: list[Item]) -> None:
         """Add the marks in comments. A mark of lost frames also has a number."""
         if not self._marks:
             return
@@ -478,11 +474,11 @@ class PcapReader:
             seconds, fraction, _, _ = heading.unpack(begun)
             # Above 16 bits pcap keeps the length of a frame check sequence.
             if link_type & 0xFFFF != _LINK_TYPE:
-                self.tally.passed_over[log_file.OTHER_PACKETS] += 1
+                self.tally.pass_over(log_file.OTHER_PACKETS)
                 continue
             frame = _parse_packet(data)
             if frame is None or isinstance(frame, str):
-                self.tally.passed_over[frame or _BAD_PACKETS] += 1
+                self.tally.pass_over(frame or _BAD_PACKETS)
             else:
                 yield Record(seconds * 1_000_000 + fraction // parts, UNNAMED, frame)
 
@@ -530,7 +526,7 @@ class PcapngWriter:
         if isinstance(frame, can.CanFrame) and not (sent or self._comments or frame.remote):
             # without the steps below: as quick as a line of candump
             size, length = _USUAL_BLOCK_BYTES, len(frame.data)
-            ident = frame.can_id | _EXTENDED if frame.extended else frame.can_id
+            ident = frame.can_id | EXTENDED if frame.extended else frame.can_id
             self._blocks.append(
                 _USUAL.pack(
                     *(_PACKET_BLOCK, size, number, at_us >> 32, at_us & _LOW, _CLASSIC_BYTES),
