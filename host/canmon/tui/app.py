@@ -91,11 +91,7 @@ class RecorderTask(Task):
     @property
     def running(self) -> bool:
         """Whether the recorder records, or waits for a trigger."""
-        recorder = self.recorder
-        return recorder is not None and recorder.state in (
-            RecorderState.WAITING,
-            RecorderState.RECORDING,
-        )
+        return self.recorder is not None and self.recorder.running
 
     @property
     def failed(self) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, Protocol, cast
@@ -47,12 +48,14 @@ class Trigger(Protocol):
 
     def missing(self, now_us: int, lost: int, /) -> str:
         """Return the reason why a missing or lost frame is a trigger, or an empty text."""
+        return ""
 
     def messages(self) -> list[str]:
         """Return other notes about the trigger."""
+        return []
 
 
-class FilterTrigger:
+class FilterTrigger(Trigger):
     """Trigger by frames that pass a filter.
 
     Args:
@@ -71,16 +74,12 @@ class FilterTrigger:
             self._missing.take(record, decoded)
         return self.name if self._wanted.matches(record, decoded) else ""
 
-    def missing(self, now_us: int, lost: int, /) -> str:
-        """Return nothing, because a filter applies only to frames that arrived."""
-        return ""
-
     def messages(self) -> list[str]:
         """Return the signals of the filter that never occurred."""
         return self._missing.messages()
 
 
-class RuleTrigger:
+class RuleTrigger(Trigger):
     """Trigger by findings of the rules of a check.
 
     Args:
@@ -101,10 +100,6 @@ class RuleTrigger:
         """Return the violation by a missing frame."""
         self._alarms.check_missing(now_us, lost)
         return self._found()
-
-    def messages(self) -> list[str]:
-        """Return no messages."""
-        return []
 
     def _found(self) -> str:
         """Return the first of the new findings. The other findings are of the same moment."""
@@ -289,6 +284,11 @@ class Recorder:
         return RecorderState.WAITING if waits else RecorderState.RECORDING
 
     @property
+    def running(self) -> bool:
+        """Whether the recorder records, or waits for a trigger."""
+        return self.state in (RecorderState.WAITING, RecorderState.RECORDING)
+
+    @property
     def ended(self) -> str:
         """Reason why the recording has ended, empty while it continues."""
         return self.failed or self._files.ended
@@ -318,10 +318,10 @@ class Recorder:
             now_us: current time.
             marks: events after these frames.
         """
-        if self.state in (RecorderState.FAILED, RecorderState.ENDED):
+        if not self.running:
             self._missing += len(decoded_frames)
             return
-        try:
+        with self._failing():
             if self._before is None and self._wanted is None:
                 self._files.store([cast("Record", record) for record, _ in decoded_frames])
             else:
@@ -329,8 +329,6 @@ class Recorder:
             self._take_marks(lost, marks, now_us)
             self._pass_time(now_us, lost)
             self._files.flush(now_us)
-        except (OSError, LogError) as error:
-            self._fail(error)
 
     def take_block(self, block: TextBlock, now_us: int) -> bool:
         """Process many frames. Return False if they must be processed one by one.
@@ -342,37 +340,27 @@ class Recorder:
         whole = self._before is None and self._wanted is None
         if not whole or self.state is not RecorderState.RECORDING:
             return False
-        try:
-            stored = self._files.store_block(block)
-            if stored:
-                self._files.flush(now_us)
-        except (OSError, LogError) as error:
-            self._fail(error)
-            return True
-        return stored
+        with self._failing():
+            if not self._files.store_block(block):
+                return False
+            self._files.flush(now_us)
+        return True
 
     def trigger(self, why: str, now_us: int) -> None:
         """Record the kept frames and the following frames, because the user pressed a key."""
-        if self._before is not None and self.state in (
-            RecorderState.WAITING,
-            RecorderState.RECORDING,
-        ):
-            try:
+        if self._before is not None and self.running:
+            with self._failing():
                 self._fire(why, why, now_us)
                 self._files.flush(now_us)
-            except (OSError, LogError) as error:
-                self._fail(error)
 
     def close(self, why: str = "closed") -> None:
         """End the recording."""
         if self._closed:
             return
         self._closed = True
-        try:
+        with self._failing():
             if not self.failed:
                 self._files.close(self._files.ended or why)
-        except (OSError, LogError) as error:
-            self._fail(error)
 
     def messages(self) -> list[str]:
         """Report the result, with one line per message."""
@@ -465,11 +453,16 @@ class Recorder:
         self._window = None
         self._files.end_part()
 
-    def _fail(self, error: Exception) -> None:
-        self.failed = str(error)
-        if isinstance(error, OSError):
-            self.failed = f"{error.filename or self._files.path}: {error.strerror}"
-        self._files.rescue(self.failed)
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """End the recording if the block cannot write, and keep what can be read."""
+        try:
+            yield
+        except (OSError, LogError) as error:
+            self.failed = str(error)
+            if isinstance(error, OSError):
+                self.failed = f"{error.filename or self._files.path}: {error.strerror}"
+            self._files.rescue(self.failed)
 
 
 def _what(record: Record, decoded: Decoded | None) -> str:
