@@ -543,8 +543,7 @@ class Files:
 
     def mark(self, mark: log_file.Mark) -> None:
         """Add a mark to the current file and to the index."""
-        if self._part is not None:
-            self._part.mark(mark)
+        self.mark_again(mark)
         if self._index is not None:
             self._index.mark(mark, "" if self._part is None else self._part.path.name)
 
@@ -578,8 +577,8 @@ class Files:
         if self._index is not None:
             with suppress(OSError):
                 if part is not None:
-                    said = {**part.summary(), "frames": part.safe_frames, "cut": True}
-                    self._index.write(_FILE, self._latest_us, file=part.path.name, **said)
+                    said = {"file": part.path.name, **part.summary(), "cut": True}
+                    self._index.write(_FILE, self._latest_us, **said)
                 self._index.write(_END, self._latest_us, why=why)
             self._index.close()
 
