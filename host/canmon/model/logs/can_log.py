@@ -596,10 +596,7 @@ class CanLogWriter:
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
-        if kind in _BINARY and path.suffix.lower() == log_file.COMPRESSED:
-            raise log_file.LogError(
-                f"{path}: {kind} is compressed by itself, it is not written with .gz"
-            )
+        log_file.check_written(path, kind)
         self._path, self._kind, self._closed = path, kind, False
         self._numbers = BusNumbers()
         self._passed_over: Counter[str] = Counter()

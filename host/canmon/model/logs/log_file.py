@@ -305,6 +305,14 @@ def log_format(path: Path) -> LogFormat:
     return SUFFIXES[suffix]
 
 
+def check_written(path: Path, kind: LogFormat) -> None:
+    """Raise LogError for a file that is read alone, or that would be compressed twice."""
+    if kind is LogFormat.PCAP:
+        raise LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
+    if kind in (LogFormat.BLF, LogFormat.MF4) and path.suffix.lower() == COMPRESSED:
+        raise LogError(f"{path}: {kind} is compressed by itself, it is not written with .gz")
+
+
 def reader_of(kind: LogFormat) -> Any:
     """Return the reader class of a format."""
     return _class_at(_FORMATS[kind][1])

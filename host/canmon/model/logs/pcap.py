@@ -506,8 +506,7 @@ class PcapngWriter:
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
-        if kind is log_file.LogFormat.PCAP:
-            raise log_file.LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
+        log_file.check_written(path, kind)
         self._file, self._blocks = log_file.open_log(path, "wb"), list[bytes]()
         self._interfaces: dict[str, int] = {}
         self._options = self._comments = b""  # of the frame that comes next

@@ -179,12 +179,9 @@ def read_plan(  # noqa: PLR0913 - all that people may say
         parts=parts,
     )
     kind = log_file.log_format(path)
-    if kind is log_file.LogFormat.BLF and path.suffix.lower() == log_file.COMPRESSED:
-        raise ValueError(f"{path}: blf is compressed by itself, it is not written with .gz")
-    if kind is log_file.LogFormat.PCAP:
-        raise ValueError(f"{path}: pcap is read alone; a name in .pcapng is written")
     if plan.numbered and kind is log_file.LogFormat.MF4:
         raise ValueError(f"{path}: mf4 is written as a whole at its end; record .blf or .log")
+    log_file.check_written(path, kind)
     return plan
 
 
