@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, Final, TextIO, assert_never
+from typing import TYPE_CHECKING, Final, TextIO
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text, line_text
@@ -135,17 +135,13 @@ def printer_of(output: DumpFormat, lines: DumpLines, raw: bool, errors: bool = F
 
 
 def _writer(output: DumpFormat, lines: DumpLines) -> _Printer:
-    match output:
-        case DumpFormat.TEXT:
-            return _text_printer(lines)
-        case DumpFormat.LOG:
-            return _log_printer
-        case DumpFormat.JSONL:
-            return _json_printer
-        case DumpFormat.CSV:
-            return csv_printer
-        case _:
-            assert_never(output)
+    printers = {
+        DumpFormat.TEXT: _text_printer(lines),
+        DumpFormat.LOG: _log_printer,
+        DumpFormat.JSONL: _json_printer,
+        DumpFormat.CSV: csv_printer,
+    }
+    return printers[output]
 
 
 def _error_meaning(record: AnyRecord) -> Decoded | None:
@@ -264,10 +260,8 @@ class StdoutWriter:
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:
         self._printer, self._output, self._lost = printer, output, 0
         self._header = output is DumpFormat.CSV
-        machine = output in (
-            DumpFormat.LOG,
-            DumpFormat.CSV,
-        )  # JSON has nothing that a terminal obeys
+        # JSON has nothing that a terminal obeys
+        machine = output in (DumpFormat.LOG, DumpFormat.CSV)
         self._shown = not machine or sys.stdout.isatty()
 
     def take(
