@@ -43,8 +43,8 @@ def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
         writer.writerow([f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}", *cells])
 
 
-def _heading(series: Series) -> str:
-    return f"{series.label} [{series.unit}]" if series.unit else series.label
+def _heading(drawn: Series | Curve) -> str:
+    return f"{drawn.label} [{drawn.unit}]" if drawn.unit else drawn.label
 
 
 def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int, int, float]]:
@@ -102,9 +102,10 @@ def write_png(  # noqa: PLR0913, PLR0917 - what is drawn, and how
             axes[axis].spines["right"].set_position(("axes", 1 + _AXIS_SHARE * (number - 1)))
     lines = []
     for curve, colour in zip(drawn.curves, cycle(COLOURS), strict=False):
-        label = f"{curve.label} [{curve.unit}]" if curve.unit else curve.label
         times, values = _points(curve, drawn)
-        lines += axes[curve.axis].plot(times, values, label=label, color=colour, linewidth=1.2)
+        lines += axes[curve.axis].plot(
+            times, values, label=_heading(curve), color=colour, linewidth=1.2
+        )
     for one in {first, *strips}:
         one.set_xlim(view.seconds(view.from_us), view.seconds(view.to_us))
         one.tick_params(labelbottom=False)
@@ -137,12 +138,10 @@ def _second(drawn: Chart, column: int) -> float:
 
 
 def _points(curve: Curve, drawn: Chart) -> tuple[list[float], list[float]]:
-    view = drawn.view
     times: list[float] = []
     values: list[float] = []
     for x, bar in curve.stops:
-        second = view.seconds(view.from_us) + x * view.span_us / drawn.columns / 1e6
-        times += [second] * len(bar)
+        times += [_second(drawn, x)] * len(bar)
         values += bar
     return times, values
 
