@@ -318,19 +318,12 @@ span_option: Final = time_option(
 """Decorator that adds the option `--for`, in microseconds."""
 
 
-def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
-    """Return the bit rate in -b or in a SOURCE word, such as can0@500k, or None without one."""
-    buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
-    named = (word.bitrate for word in buses if word.bitrate is not None)
-    return next(named, None) if options.bitrate is None else options.bitrate
-
-
 def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
     """Return both bit rates in the options or in a SOURCE word, such as can0@500k/2M."""
-    buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
-    named = (word.data_bitrate for word in buses if word.data_bitrate is not None)
-    fast = next(named, None) if options.data_bitrate is None else options.data_bitrate
-    return BitRates(bit_rate_of(words, options), fast)
+    buses = [word for word in map(parse_source, words) if isinstance(word, BusSpec)]
+    nominal = [options.bitrate, *(bus.bitrate for bus in buses)]
+    fast = [options.data_bitrate, *(bus.data_bitrate for bus in buses)]
+    return BitRates(*(next(filter(None, rates), None) for rates in (nominal, fast)))
 
 
 def follow(  # noqa: PLR0913 - how, on a screen and without

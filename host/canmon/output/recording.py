@@ -246,20 +246,6 @@ class RecordingOptions:
         self.triggers = [_trigger(word, bit_rate) for word in words]
         self.decodes = any(trigger.decodes for trigger in self.triggers)
 
-    def open(self, source: Sequence[str], live: bool, wanted: FilterTrigger | None) -> LogFile:
-        """Start the recording.
-
-        Args:
-            source: SOURCE words of the recorded source.
-            live: whether time passes without frames.
-            wanted: filter for the recorded frames, or None for all frames.
-
-        Raises:
-            Refused: the format cannot be written here, or the file is being read.
-            SourceFailed: the file cannot be written.
-        """
-        return LogFile(self.plan, source, live, self.triggers, wanted)
-
 
 def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
     """Parse a file and options of a recording in parts. Raise Refused if they are invalid."""
@@ -288,11 +274,7 @@ def _read_recording_plan(path: Path, options: dict[str, Any], parts: bool = Fals
     try:
         return read_plan(
             path,
-            rotate=options["rotate"],
-            disk=options["disk"],
-            at_limit=options["at_limit"],
-            pre=options["pre"],
-            post=options["post"],
+            **{name: options[name] for name in NAMES if name != "trigger"},
             waits=bool(options["trigger"]),
             parts=parts,
         )

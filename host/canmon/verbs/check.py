@@ -625,7 +625,7 @@ def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
 
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
     """Return the bit rate. Raise Refused if a rule needs it and it is missing."""
-    bit_rate = listening.bit_rate_of(words, bus)
+    bit_rate = listening.bit_rates_of(words, bus).nominal
     with refusing():
         rules.load(bit_rate)
     return bit_rate

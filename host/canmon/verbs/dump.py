@@ -21,7 +21,7 @@ from tickrig.host.canmon.model.recorder.files import RecordingPlan
 from tickrig.host.canmon.model.recorder.recorder import FilterTrigger
 from tickrig.host.canmon.output import printer
 from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
+    bit_rates_of,
     expect_frames,
     report,
     say_marks,
@@ -204,12 +204,10 @@ def dump(  # noqa: PLR0913 - options
             "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
         )
     _refuse_idle(source, output, file, raw=raw, filtered=wanted is not None)
-    chosen, form, bus = (
-        decode_options.read_filter(wanted),
-        printer.DumpFormat(output or ""),
-        BusOptions(**options),
-    )
-    recording = None if file is None else RecordingOptions(file, given, bit_rate_of(source, bus))
+    chosen, form = decode_options.read_filter(wanted), printer.DumpFormat(output or "")
+    bus = BusOptions(**options)
+    bit_rate = bit_rates_of(source, bus).nominal
+    recording = None if file is None else RecordingOptions(file, given, bit_rate)
     decodes = recording is not None and recording.decodes
     plain = (raw or form is printer.DumpFormat.LOG or file is not None) and not decodes
     decoder = None if plain and chosen is None else decode_options.make_decoder(eds, dbc)
@@ -234,7 +232,8 @@ def dump(  # noqa: PLR0913 - options
         if reopen or (recording is not None and recording.plan.numbered):
             frames.reopen()
         if recording is not None:
-            log = held.enter_context(closing(recording.open(source, frames.live, kept)))
+            log = LogFile(recording.plan, source, frames.live, recording.triggers, kept)
+            held.enter_context(closing(log))
             take = log.take
             if recording.plan.around is not None:
                 keys = _TriggerKeys("-" not in source)

@@ -63,10 +63,8 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    chosen, model = (
-        decode_options.read_filter(wanted),
-        TopModel(listening.bit_rates_of(source, bus)),
-    )
+    chosen = decode_options.read_filter(wanted)
+    model = TopModel(listening.bit_rates_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
     meaning = FilteredDecoder(None if plain else decode_options.make_decoder(eds, dbc), chosen)
     take: _Take = model.take
