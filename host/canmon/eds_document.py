@@ -81,12 +81,14 @@ _IDENTITY: Final = 0x1018
 
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
     """Return the identity of a node (1018h), or None if it does not send vendor or product."""
-    return eds_folder.node_identity([_number(bus, node_id, sub) for sub in (1, 2, 3)])
+    numbers = [read_number(bus, node_id, _IDENTITY, sub) for sub in (1, 2, 3)]
+    return eds_folder.node_identity(numbers)
 
 
-def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
+def read_number(bus: NodeBus, node_id: int, index: int, sub: int, size: int = 4) -> int | None:
+    """Return the number in an object of a node, or None if it cannot be read."""
     try:
-        return int.from_bytes(bus.read(node_id, _IDENTITY, sub, 4), "little")
+        return int.from_bytes(bus.read(node_id, index, sub, size), "little")
     except SdoFailed:
         return None
 

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.eds_document import chosen_eds, read_device_document
+from tickrig.host.canmon.eds_document import chosen_eds, read_device_document, read_number
 from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
@@ -17,7 +17,7 @@ from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
 from tickrig.host.canopen.commissioning.configuration import same
 from tickrig.host.canopen.conform.subject import TOLD, other_device
-from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
@@ -203,10 +203,10 @@ def known_objects(
     data = _device_type(session, node_id)
     objects.learn(DEVICE_TYPE, data)
     if eds is not None:
-        about = {"device type": _as_hex(data)}
+        about = {"device type": f"{int.from_bytes(data, 'little'):08X}h"}
         for name, at in list(TOLD.items())[1:]:
-            if (said := _number(session, node_id, at)) is not None:
-                about[name] = said
+            if (number := read_number(session.bus, node_id, *at)) is not None:
+                about[name] = f"{number:08X}h"
         if text := other_device(objects.device, about):
             if strict:
                 raise Refused(f"node {node_id}: {text}; --other-device takes it all the same")
@@ -221,18 +221,6 @@ def _device_type(session: NetSession, node_id: int) -> bytes:
         within = f"no answer within {error.timeout_us // 1_000} ms"
         text = f"node {node_id}: {within} to the read of 1000h that each node has"
         raise NodeFailed(text) from None
-
-
-def _as_hex(data: bytes) -> str:
-    """Return a number of 32 bits in hex."""
-    return f"{int.from_bytes(data, 'little'):08X}h"
-
-
-def _number(session: NetSession, node_id: int, at: Entry) -> str | None:
-    try:
-        return _as_hex(session.bus.read(node_id, *at, 4))
-    except SdoFailed:
-        return None
 
 
 _TYPES: Final = {

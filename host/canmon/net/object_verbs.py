@@ -8,7 +8,7 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.eds_document import node_eds_option
+from tickrig.host.canmon.eds_document import node_eds_option, read_number
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.net import node_objects
@@ -39,7 +39,7 @@ from tickrig.host.canopen.commissioning.configuration import (
     writes,
 )
 from tickrig.host.canopen.conform.write_order import Write
-from tickrig.host.canopen.errors import SdoAborted, SdoFailed
+from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import Refused, refusing, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import json_text, one_line
@@ -503,11 +503,7 @@ def _steps(
     writable = {at for at, row in objects.rows.items() if row.writable}
 
     def number(at: node_objects.Entry) -> int:
-        try:
-            data = session.bus.read(objects.node_id, *at, objects.size(at))
-        except SdoFailed:
-            return 0
-        return int.from_bytes(data, "little")
+        return read_number(session.bus, objects.node_id, *at, objects.size(at)) or 0
 
     with refusing(f"FILE {file}:"):
         return writes(changed, number, writable)
