@@ -135,16 +135,13 @@ def command(  # noqa: PLR0913, PLR0917 - options
     wanted = None if expect is None else _identification(expect)
     with net_session(call, node) as session:
         program = Program(session.bus, node, number, lambda text: say(f"node {node}: {text}"))
-        with of_node(node, _title):
-            status = program.status()
         try:
             with of_node(node, _title):
+                status = program.status()
                 if file is not None:
                     click.echo(f"node {node}: {status}")
-                    if wanted is not None and (status.control, status.identification) == (
-                        1,
-                        wanted,
-                    ):
+                    runs = status.control == COMMANDS["start"] and status.identification == wanted
+                    if runs and wanted is not None:
                         say(f"node {node}: it runs what is expected; nothing is to be done")
                         return
                     if dry_run:
