@@ -15,7 +15,7 @@ from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
-from tickrig.host.canopen.commissioning.configuration import same
+from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, same
 from tickrig.host.canopen.conform.subject import TOLD, other_device
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
 from tickrig.host.cli.messages import Refused, say
@@ -134,6 +134,12 @@ class NamedObjects:
             f"no object {word!r} of node {self.node_id}; {near(word.casefold(), self._names)}"
             " An index is written 6041h, or 1018h:1"
         )
+
+    def dcf_values(self) -> Values:
+        """Return the values that the file of the node configures."""
+        assert self.file is not None
+        assert self.device is not None
+        return dcf_values(self.file, self.device, self.node_id)
 
     @cached_property
     def _names(self) -> Mapping[str, Entry]:
@@ -349,7 +355,7 @@ def differences(
             yield _ValueDifference(entry, wanted, found)
 
 
-def line(objects: NamedObjects, one: _ValueDifference, where: str) -> str:
+def difference_text(objects: NamedObjects, one: _ValueDifference, where: str) -> str:
     """Return a difference as text, with the value here and the other value."""
     there = f"{shown(objects, one.entry, one.wanted)} {where}"
     here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"

@@ -36,7 +36,7 @@ from tickrig.host.canmon.net.session import (
 )
 from tickrig.host.canmon.risks import NMT_WORDS, nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import decode_bus_file, read_bus_file
-from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
+from tickrig.host.canopen.commissioning.configuration import writes
 from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
 from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
@@ -114,7 +114,10 @@ def scan(  # noqa: PLR0913, PLR0917 - options
     say(counted(len(found), "node"))
     if rules is not None:
         _write_rules(rules, call, found)
-    files = {} if folder is None else _eds_files(found, folder, "not written: " * bool(bus_file))
+    files: dict[int, Path | None] = {}
+    if folder is not None:
+        without = "not written: " * bool(bus_file)
+        files = {node.node_id: _eds_of(node, folder, without) for node in found}
     if workspace is not None:
         _write_workspace(workspace, call, files, eds_folders)
     if bus_file is not None:
@@ -184,11 +187,6 @@ def _writing(
         if path.exists() and not force:
             raise Refused(f"{option} {path} is there already: choose another name, or give --force")
     return read_eds_folders(folders) if folders else None
-
-
-def _eds_files(found: list[NodeFound], folder: EdsFolder, without: str) -> dict[int, Path | None]:
-    """Return the EDS of each node, or None with a line that begins with `without`."""
-    return {node.node_id: _eds_of(node, folder, without) for node in found}
 
 
 def _write_workspace(
@@ -458,10 +456,7 @@ def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
     Revision and serial number of an EDS are those of one device and are not compared.
     """
     objects = NamedObjects(node_id, read_device_document(path, "--eds").file)
-    file, device = objects.file, objects.device
-    assert file is not None
-    assert device is not None
-    values = dcf_values(file, device, node_id)
+    values = objects.dcf_values()
     power_on = {at: row.power_on_data(node_id) for at, row in objects.rows.items()}
 
     def number(at: tuple[int, int]) -> int:
@@ -503,12 +498,6 @@ def _changes(assignment: SlaveAssignment) -> list[str]:
     if assignment.writes:
         found.append(counted(len(assignment.writes), "write"))
     return found
-
-
-def _nothing_expected(node_id: int) -> SlaveAssignment:
-    """Return the default expectation that the node answers."""
-    say("no --bus and no --eds: nothing is expected of the node but that it answers")
-    return SlaveAssignment(node_id)
 
 
 _OnStep = Callable[[boot_slave.BootStep], None]
@@ -589,7 +578,10 @@ def boot(  # noqa: PLR0913, PLR0917 - options
 def _expected(node: int, bus_file: Path | None, eds: Path | None) -> SlaveAssignment:
     if bus_file is not None:
         return _of_bus_file(bus_file, node)
-    return _nothing_expected(node) if eds is None else _of_eds(eds, node)
+    if eds is not None:
+        return _of_eds(eds, node)
+    say("no --bus and no --eds: nothing is expected of the node but that it answers")
+    return SlaveAssignment(node)
 
 
 def _step_printer(session: NetSession, *, shown: bool) -> _OnStep:

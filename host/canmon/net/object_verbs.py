@@ -11,11 +11,12 @@ import click
 from tickrig.host.canmon.eds_document import node_eds_option, read_number
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
-from tickrig.host.canmon.net import node_objects
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import (
     Entry,
     NamedObjects,
+    difference_text,
+    differences,
     encoded,
     known_objects,
     limits,
@@ -31,20 +32,13 @@ from tickrig.host.canmon.net.session import (
     print_plan,
 )
 from tickrig.host.canmon.risks import write_risk
-from tickrig.host.canopen.commissioning.configuration import (
-    Values,
-    dcf_values,
-    disabled,
-    is_parameter,
-    writes,
-)
+from tickrig.host.canopen.commissioning.configuration import Values, disabled, is_parameter, writes
 from tickrig.host.canopen.conform.write_order import Write
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import Refused, refusing, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted
-from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.canopen.sdo_frame import describe_abort
 
@@ -213,17 +207,15 @@ def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) 
         other_id = _other_id(other)
         file = eds if other_id else Path(other)
         with of_node(node):
-            objects = node_objects.known_objects(
-                session, node, file, what="--eds" if other_id else "FILE"
-            )
+            objects = known_objects(session, node, file, what="--eds" if other_id else "FILE")
         if other_id:
             values, where = _of_node(session, objects, other_id), f"at node {other_id}"
         else:
             values, where = _of_file(objects), "in the file"
         with of_node(node, objects.title):
-            for one in node_objects.differences(session, objects, values):
+            for one in differences(session, objects, values):
                 found += 1
-                click.echo(one_line(node_objects.line(objects, one, where)))
+                click.echo(one_line(difference_text(objects, one, where)))
         say(f"objects that differ: {found} of {len(values)}")
     if found:
         raise click.exceptions.Exit(_DIFFERENT)
@@ -237,21 +229,17 @@ def _other_id(word: str) -> int:
     return number
 
 
-def _default_values(device: EdsDevice, node_id: int) -> Values:
+def _default_values(objects: NamedObjects) -> Values:
     """Return the defaults of all parameters that an EDS describes."""
     return {
-        (row.index, row.sub): row.power_on_data(node_id)
-        for row in device.entries
+        at: row.power_on_data(objects.node_id)
+        for at, row in objects.rows.items()
         if row.has_default and is_parameter(row)
     }
 
 
-def _of_file(objects: node_objects.NamedObjects) -> Values:
-    assert objects.file is not None
-    assert objects.device is not None
-    node_id = objects.node_id
-    values = dcf_values(objects.file, objects.device, node_id)
-    values = values or _default_values(objects.device, node_id)
+def _of_file(objects: NamedObjects) -> Values:
+    values = objects.dcf_values() or _default_values(objects)
     return {at: data for at, data in values.items() if objects.rows[at].readable}
 
 
@@ -266,7 +254,7 @@ def _values_of(session: NetSession, node_id: int, entries: Collection[Entry]) ->
     return found
 
 
-def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
+def _of_node(session: NetSession, objects: NamedObjects, other_id: int) -> Values:
     """Return the parameters of another node, converted to the node-ID of this node."""
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:
@@ -457,10 +445,8 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
     """  # noqa: D301 - click wants the backspace
     with net_session(call, node) as session:
         with of_node(node):
-            objects = node_objects.known_objects(
-                session, node, file, what="FILE", strict=not other_device
-            )
-        values = _dcf_values(objects, skip)
+            objects = known_objects(session, node, file, what="FILE", strict=not other_device)
+        values = _dcf_values(objects, file, skip)
         with of_node(node, objects.title):
             changed = values if whole else _changed(session, objects, values)
             steps = _steps(session, objects, changed, file)
@@ -470,51 +456,44 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
             return
         what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
         what += ", then stored" if store else ""
-        session.confirm(
-            what, yes=yes, risk=write_risk(objects.is_drive, [at for at, _ in changed.items()])
-        )
+        session.confirm(what, yes=yes, risk=write_risk(objects.is_drive, changed))
         _write_all(session, objects, steps, store=store)
 
 
-def _dcf_values(objects: node_objects.NamedObjects, skip: Sequence[str]) -> Values:
-    file, device = objects.file, objects.device
-    assert file is not None
-    assert device is not None
+def _dcf_values(objects: NamedObjects, file: Path, skip: Sequence[str]) -> Values:
     left_out = {objects.find(word) for word in skip}
-    values = dcf_values(file, device, objects.node_id)
+    values = objects.dcf_values()
     if not values:
-        raise Refused(f"{file.name} has no ParameterValue of an object that can be written: no DCF")
+        raise Refused(f"{file} has no ParameterValue of an object that can be written: no DCF")
     return {at: data for at, data in values.items() if at not in left_out}
 
 
-def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Values) -> Values:
+def _changed(session: NetSession, objects: NamedObjects, values: Values) -> Values:
     """Return and print the differences of the node."""
-    found = list(node_objects.differences(session, objects, values))
+    found = list(differences(session, objects, values))
     for one in found:
-        click.echo(one_line(node_objects.line(objects, one, "in the file")))
+        click.echo(one_line(difference_text(objects, one, "in the file")))
     say(f"objects that differ: {len(found)} of {len(values)}")
     return {one.entry: one.wanted for one in found}
 
 
-def _steps(
-    session: NetSession, objects: node_objects.NamedObjects, changed: Values, file: Path
-) -> list[Write]:
+def _steps(session: NetSession, objects: NamedObjects, changed: Values, file: Path) -> list[Write]:
     """Return the writes. Raise Refused if the file has impossible writes."""
     writable = {at for at, row in objects.rows.items() if row.writable}
 
-    def number(at: node_objects.Entry) -> int:
+    def number(at: Entry) -> int:
         return read_number(session.bus, objects.node_id, *at, objects.size(at)) or 0
 
     with refusing(f"FILE {file}:"):
         return writes(changed, number, writable)
 
 
-def _titles(objects: node_objects.NamedObjects, steps: Sequence[Write]) -> list[str]:
-    return [f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps]
+def _titles(objects: NamedObjects, steps: Sequence[Write]) -> list[str]:
+    return [f"{objects.title(at)} = {shown(objects, at, data)}" for at, data in steps]
 
 
 def _write_all(
-    session: NetSession, objects: node_objects.NamedObjects, steps: Sequence[Write], *, store: bool
+    session: NetSession, objects: NamedObjects, steps: Sequence[Write], *, store: bool
 ) -> None:
     session.work.plan(*_titles(objects, steps), *(["store"] if store else []))
     for number, (at, data) in enumerate(steps):
