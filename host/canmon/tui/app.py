@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, TypeVar
@@ -519,16 +519,26 @@ class MonitorApp(FramedApp):
     def action_export(self) -> None:
         """Ask for a file, and store the settings in this file."""
         path = self.panel_settings.workspace.path
-        self.push_screen(_ExportScreen("" if path is None else str(path)), self._export)
+        self._prompt(_ExportScreen("" if path is None else str(path)), self._export)
 
-    def _export(self, name: str | None) -> None:
-        if name:
-            try:
-                self.panel_settings.export(Path(name))
-            except workspace.WorkspaceError as error:
-                self.notify(str(error), severity="error")
-                return
-            self.notify(f"settings are kept in {name}")
+    def _prompt(self, screen: _ExportScreen, act: Callable[[str], str | None]) -> None:
+        """Ask for a text, act with it, and show the message or the error of this."""
+
+        def take(text: str | None) -> None:
+            if text:
+                try:
+                    said = act(text)
+                except (OSError, ValueError) as error:
+                    self.notify(str(error), severity="error")
+                    return
+                if said:
+                    self.notify(said)
+
+        self.push_screen(screen, take)
+
+    def _export(self, name: str) -> str:
+        self.panel_settings.export(Path(name))
+        return f"settings are kept in {name}"
 
     def action_settings(self) -> None:
         """Show the settings screen, and apply changes."""
@@ -671,24 +681,14 @@ class MonitorApp(FramedApp):
     def action_picture(self) -> None:
         """Ask for a file, and save the screen as a picture."""
         name = f"canmon-{self.shown.title}.svg"
-        self.push_screen(_ExportScreen(name, "save the screen as", ".svg or .png"), self._picture)
-
-    def _picture(self, name: str | None) -> None:
-        if not name:
-            return
-        path = Path(name)
-        try:
-            said = self._write_picture(path)
-        except (OSError, ValueError) as error:
-            self.notify(str(error), severity="error")
-            return
-        self.notify(said)
+        screen = _ExportScreen(name, "save the screen as", ".svg or .png")
+        self._prompt(screen, lambda text: self._write_picture(Path(text)))
 
     def _write_picture(self, path: Path) -> str:
         """Write the screen as a picture. Return a message. Raise ValueError for other suffixes."""
+        said = ""
         if path.suffix.lower() not in (".svg", ".png"):
             raise ValueError(f"{path}: a picture of the screen is .svg or .png")
-        said = f"{path} is written"
         if path.suffix.lower() == ".png":
             strips = self.screen._compositor.render_strips()  # as export_screenshot does
             try:
@@ -696,11 +696,9 @@ class MonitorApp(FramedApp):
             except ImportError:
                 said = "PNG needs matplotlib: pip install 'tickrig[plot]'; "
                 path = path.with_suffix(".svg")
-                said += f"{path} is written"
-            else:
-                return said
-        write_whole(path, _FONTS.sub("", self.export_screenshot(title="canmon tui")))
-        return said
+        if path.suffix.lower() == ".svg":
+            write_whole(path, _FONTS.sub("", self.export_screenshot(title="canmon tui")))
+        return f"{said}{path} is written"
 
     def action_times(self) -> None:
         """Change the format of times in all tabs."""
@@ -722,14 +720,7 @@ class MonitorApp(FramedApp):
             self.notify("all of a log is there: canmon conv writes it into another")
         else:
             screen = _ExportScreen(self.recorder.words, "record into", WORDS_METAVAR)
-            self.push_screen(screen, self._record)
-
-    def _record(self, words: str | None) -> None:
-        if words:
-            try:
-                self.recorder.start(words)
-            except ValueError as error:
-                self.notify(str(error), severity="error", markup=False)
+            self._prompt(screen, self.recorder.start)
 
     def action_trigger(self) -> None:
         """Record the kept and the following frames."""
