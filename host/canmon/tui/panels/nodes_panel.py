@@ -73,24 +73,15 @@ def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) 
         width: number of columns of the screen.
     """
     several = len({row.channel for row in rows}) > 1
-    tables = [(column, _cells(column, rows, now_us, width)) for column in _columns(several, width)]
+    node = _BoardColumn("NODE", _bus_node if several else _node, kept=True)
+    columns = (node, *(one for one in _COLUMNS if one.least <= width))
+    tables = [(one, [one.cell(row, now_us, width) for row in rows]) for one in columns]
     used = [one for one in tables if one[0].kept or any(map(line_width, one[1]))]
     widths = _widths(used, width)
     head = _GAP.join(
         f"{column.title:<{wide}.{wide}}" for (column, _), wide in zip(used, widths, strict=True)
     )
     return [plain(head.rstrip(), _HEAD), *_joined([cells for _, cells in used], widths)]
-
-
-def _columns(several: bool, width: int) -> list[_BoardColumn]:
-    node = _bus_node if several else _node
-    return [_BoardColumn("NODE", node, kept=True), *(one for one in _COLUMNS if one.least <= width)]
-
-
-def _cells(
-    column: _BoardColumn, rows: Sequence[node_board.NodeStatus], now_us: int, width: int
-) -> list[Line]:
-    return [column.cell(row, now_us, width) for row in rows]
 
 
 def _widths(used: Sequence[tuple[_BoardColumn, Sequence[Line]]], width: int) -> list[int]:
@@ -418,14 +409,12 @@ class NodesPanel(Panel):
         if not self.session.can_send:
             self.notify("a log has no nodes to be asked")
         elif self.may_send():
-            question = (
-                f"Read 1000h of node-IDs 1 to 127 on {self._bus}, and 1018h of each that answers."
-                " An SDO transfer of another master may be disturbed. Send it (y or n)?"
+            bus = self._bus
+            what = (
+                f"Read 1000h of node-IDs 1 to 127 on {bus}, and 1018h of each that answers."
+                " An SDO transfer of another master may be disturbed"
             )
-            self.query_one(PromptLine).prompt(question, "", partial(self._scan, self._bus))
-
-    def _scan(self, bus: str, answer: str) -> None:
-        self._if_yes(answer, lambda: self.master.scan(bus, self.session.now_us))
+            self._prompt(what, lambda: self.master.scan(bus, self.session.now_us))
 
     def on_choice_view_chosen(self) -> None:
         """Show the card of another node."""
@@ -448,15 +437,16 @@ class NodesPanel(Panel):
         command, whom = NMT_WORDS[word], "all nodes" if to_all else f"node {row.node}"
         risk = nmt_risk(command, None if to_all else row.memory.number(*DEVICE_TYPE))
         several = f" on {row.channel}" * (len(self.session.buses) > 1)
-        question = f"NMT {word} to {whom}{several}. {risk}. Send it (y or n)?"
         node = ALL_NODES if to_all else row.node
-        take = partial(self._answered, row.channel, node, command)
-        self.query_one(PromptLine).prompt(question, "", take)
+        send = partial(self.master.command, row.channel, node, command)
+        self._prompt(f"NMT {word} to {whom}{several}. {risk}", send)
 
-    def _answered(self, channel: str, node: int, command: NmtCommand, answer: str) -> None:
-        self._if_yes(answer, lambda: self.master.command(channel, node, command))
+    def _prompt(self, what: str, act: Callable[[], object]) -> None:
+        """Ask whether to send what is described."""
+        take = partial(self._answered, act)
+        self.query_one(PromptLine).prompt(f"{what}. Send it (y or n)?", "", take)
 
-    def _if_yes(self, answer: str, act: Callable[[], object]) -> None:
+    def _answered(self, act: Callable[[], object], answer: str) -> None:
         if answer.lower() in _YES and self.may_send():
             self.change(act)
         elif answer.lower() not in (*_YES, "n", "no"):
