@@ -336,9 +336,7 @@ class TracePanel(Panel):
 
     def action_pause(self) -> None:
         """Pause or continue the display. Frames are recorded in both cases."""
-        with self.session.lock:
-            held = self._display_filter.passed.copy(), self._display_filter.latest()
-        self.paused, self._cursor = (None, None) if self.paused else (held, None)
+        self.paused, self._cursor = None if self.paused else self._held(), None
         self.refresh_view()
 
     def action_overwrite(self) -> None:
@@ -384,14 +382,16 @@ class TracePanel(Panel):
         return place
 
     def _passed(self) -> Ring:
+        return (self.paused or self._held())[0]
+
+    def _held(self) -> tuple[Ring, list[Latest]]:
+        """Return copies of the rows that pass the filter, and the latest of each identifier."""
         with self.session.lock:
-            return self.paused[0] if self.paused else self._display_filter.passed.copy()
+            return self._display_filter.passed.copy(), self._display_filter.latest()
 
     def _go(self, number: int) -> None:
         """Pause the display with a row in its middle."""
-        if self.paused is None:
-            with self.session.lock:
-                self.paused = self._display_filter.passed.copy(), self._display_filter.latest()
+        self.paused = self.paused or self._held()
         self.overwrite, self._cursor = False, number
         view = self.query_one(LineView)
         self.refresh_view()  # as many lines as there are have to be known before it is scrolled
@@ -468,8 +468,7 @@ class TracePanel(Panel):
         self.query_one(PromptLine).prompt(f"a log: {' '.join(SUFFIXES)}", "trace.log", self._write)
 
     def _write(self, text: str) -> None:
-        with self.session.lock:
-            passed = (self.paused[0] if self.paused else self._display_filter.passed).copy()
+        passed = self._passed()
         rows = passed.rows(passed.first, passed.count)
         for said in write_records(Path(text), [row.record for row in rows]):
             self.notify(said, markup=False)
