@@ -21,7 +21,7 @@ from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canmon.tui.panels.panel import ChoiceView, Panel, PromptLine, TitleLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, text_of
-from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script
+from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.tui import Line, plain
 from tickrig.wire.can import CanFrame, Frames
@@ -145,18 +145,13 @@ class DictionaryTask(Task):
         self._out.append(CanFrame(can_id, data))
 
     def _start(self, now_us: int, what: str, script: Script[object]) -> None:
-        def done(result: object) -> None:
-            self._ended(f"{what}: done")
-
-        def failed(failure: Failure) -> None:
-            self._ended(str(failure))
+        def ended(said: object) -> None:
+            self.left -= 1
+            self.result = str(said)
 
         self.left += 1
-        self._dialogue.start(now_us, QueuedScript(what, script, done, failed))
-
-    def _ended(self, said: str) -> None:
-        self.left -= 1
-        self.result = said
+        queued = QueuedScript(what, script, lambda result: ended(f"{what}: done"), ended)
+        self._dialogue.start(now_us, queued)
 
 
 _MARK: Final = "* "
