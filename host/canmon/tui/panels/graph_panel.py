@@ -179,15 +179,8 @@ class GraphPanel(panel.Panel):
         with self.session.lock:
             trace = self.session.model.trace
             rows = trace.rows(trace.first, trace.count)
-            record = ((row.record, row.decoded) for row in rows)
-            self.graph.add(
-                word,
-                (
-                    (one, decoded_frames)
-                    for one, decoded_frames in record
-                    if isinstance(one, Record)
-                ),
-            )
+            pairs = ((row.record, row.decoded) for row in rows)
+            self.graph.add(word, ((one, seen) for one, seen in pairs if isinstance(one, Record)))
         self._texts.append(text)
 
     def _remove(self, text: str) -> None:
