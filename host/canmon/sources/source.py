@@ -67,6 +67,7 @@ class AnySource(Generic[_Taken_co]):
     failed = ""
     marks: Sequence[log_file.Mark] = ()
     _ended = False
+    _cut: _CutLog | None = None
 
     @property
     def ended(self) -> bool:
@@ -105,8 +106,9 @@ class AnySource(Generic[_Taken_co]):
         return []
 
     def messages(self) -> list[str]:
-        """Report invalid and lost frames, with one line per message."""
-        return [text for name, tally in self.tallies() for text in tally.messages(name)]
+        """Report invalid and lost frames, and an empty part, with one line per message."""
+        said = [text for name, tally in self.tallies() for text in tally.messages(name)]
+        return said + (self._cut.messages() if self._cut else [])
 
     def losses(self) -> list[str]:
         """Report lost and unreadable frames, but not items of other types."""
@@ -119,7 +121,7 @@ class AnySource(Generic[_Taken_co]):
     @property
     def nothing_passed(self) -> bool:
         """Whether there were frames, but filters of SOURCE words or a cut removed all of them."""
-        return False
+        return self._cut is not None and self._cut.empty
 
     @property
     def without_errors(self) -> str:
@@ -399,15 +401,6 @@ class _LoggedSource(AnySource[Record]):
         """Number of frames that the recorder lost before the next frames."""
         return super().lost if self._ended and self._cut is None else self._said_lost
 
-    @property
-    def nothing_passed(self) -> bool:
-        """Whether there were frames, but a filter or a cut removed all of them."""
-        return self._cut is not None and self._cut.empty
-
-    def messages(self) -> list[str]:
-        """Report invalid and lost frames, and an empty part."""
-        return [*super().messages(), *(self._cut.messages() if self._cut else ())]
-
     def _read(self, timeout_us: int) -> Sequence[Item]:
         """Return the next records, or none. `_no_more` is set at the end."""
         return []
@@ -447,8 +440,6 @@ class FileSource(_LoggedSource):
     Raises:
         SourceFailed: a file cannot be read.
     """
-
-    live = False
 
     def __init__(self, files: Sequence[FileSpec], cut: LogCut = _WHOLE) -> None:
         super().__init__(cut)
@@ -585,15 +576,6 @@ class BlockLog(AnySource["Columns"]):
         """Return the tally of the file."""
         return [(str(self._path), self._reader.tally)]
 
-    @property
-    def nothing_passed(self) -> bool:
-        """Whether there were frames, but no frame was in the wanted part."""
-        return self._cut is not None and self._cut.empty
-
-    def messages(self) -> list[str]:
-        """Report invalid and lost frames, and an empty part."""
-        return [*super().messages(), *(self._cut.messages() if self._cut else ())]
-
     def poll(self, timeout_us: int, /) -> list[Columns]:
         """Return the next block. The method never waits."""
         try:
@@ -618,8 +600,6 @@ class PieceLog(_LoggedSource):
     Raises:
         SourceFailed: the file cannot be read.
     """
-
-    live = False
 
     def __init__(self, path: Path, cut: LogCut = _WHOLE) -> None:
         super().__init__(cut)
