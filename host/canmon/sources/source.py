@@ -446,15 +446,15 @@ class FileSource(_LoggedSource):
         self._names = [str(file.path) for file in files]
         self._silent = {str(file.path) for file in files if file.chosen is not None}
         self._readers = [read_log(file.path) for file in files]
-        for file in files:
+        streams: list[Iterator[Item]] = []
+        for file, reader in zip(files, self._readers, strict=True):
             _check_readable(file.path)
-        streams = [
-            self._chosen_items(
-                file, self._cut.noted(reader.items()) if self._cut else reader.items()
-            )
-            for file, reader in zip(files, self._readers, strict=True)
-        ]
-        self._stream = streams[0] if len(streams) == 1 else _merged(streams)
+            items = reader.items() if self._cut is None else self._cut.noted(reader.items())
+            if file.chosen is not None:
+                items = self._passing(str(file.path), file.chosen, items)
+            streams.append(items)
+        merged = heapq.merge(*streams, key=lambda item: item.at_us)
+        self._stream = streams[0] if len(streams) == 1 else merged
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
         """Return the tally of each file, with its name."""
@@ -470,11 +470,6 @@ class FileSource(_LoggedSource):
             self.failed = str(error)
         self._no_more = len(batch) < _BATCH
         return batch
-
-    def _chosen_items(self, file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
-        """Return the items of a file that pass its filter, or all items without a filter."""
-        chosen = file.chosen
-        return items if chosen is None else self._passing(str(file.path), chosen, items)
 
     def _passing(self, name: str, chosen: CandumpFilter, items: Iterator[Item]) -> Iterator[Item]:
         passing = (
@@ -512,10 +507,6 @@ def _check_readable(path: Path) -> None:
         path.open("rb").close()
     except OSError as error:
         raise SourceFailed(f"{path}: {error.strerror}") from error
-
-
-def _merged(streams: Sequence[Iterator[Item]]) -> Iterator[Item]:
-    return heapq.merge(*streams, key=lambda item: item.at_us)
 
 
 STDIN: Final = 0
@@ -654,19 +645,19 @@ def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
         Refused: the words do not name a source.
         SourceFailed: a file cannot be read.
     """
-    path = None if cut.earlier else _large_log(words)
+    path = _large_log(words, cut)
     return None if path is None else BlockLog(path, cut)
 
 
 def piece_log(words: Sequence[str], cut: LogCut = _WHOLE) -> PieceLog | None:
     """Open the log that SOURCE words name, to read it in pieces; see `block_log`."""
-    path = None if cut.earlier else _large_log(words)
+    path = _large_log(words, cut)
     return None if path is None else PieceLog(path, cut)
 
 
-def _large_log(words: Sequence[str]) -> Path | None:
+def _large_log(words: Sequence[str], cut: LogCut) -> Path | None:
     """Return the path of a log that should be read in blocks."""
-    if len(words) != 1 or find_spec("numpy") is None:
+    if cut.earlier or len(words) != 1 or find_spec("numpy") is None:
         return None
     word = parse_source(words[0])
     if not isinstance(word, FileSpec) or word.chosen is not None:
