@@ -133,7 +133,8 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> No
     stopped: list[bool] = []
 
     def begin() -> Answer:
-        return _answering(Gateway(bus, net, VERSION))
+        gateway = Gateway(bus, net, VERSION)
+        return lambda line: _line(gateway.answer(line.decode("latin-1").rstrip("\r")))
 
     server = LineServer(listener, begin, _refusal, _MAX_LINE)
     with stopped_by_signals(lambda: stopped.append(True)), suppress(KeyboardInterrupt):
@@ -142,11 +143,6 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> No
             server.serve(_WAIT_US)
             bus.listen(bus.now_us)
     server.close()
-
-
-def _answering(gateway: Gateway) -> Answer:
-    """Return the function that answers the lines of a client."""
-    return lambda line: _line(gateway.answer(line.decode("latin-1").rstrip("\r")))
 
 
 def _line(text: str) -> bytes:
