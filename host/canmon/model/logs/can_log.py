@@ -422,9 +422,6 @@ class _AscWriter:
             self._begin(mark.at_us)
         self._file.write(f"// {mark.text}\n")
 
-    def flush(self) -> None:
-        """Do nothing, because all data are in the file already."""
-
     def stop(self) -> None:
         """End the log."""
         if self._begin_us is None:
@@ -501,9 +498,6 @@ class _TrcWriter(can.TRCWriter):
         self._begin(mark.at_us)
         self.file.write(f";   {mark.text}\n")
 
-    def flush(self) -> None:
-        """Do nothing, because all data are in the file already."""
-
     def _begin(self, at_us: int) -> None:
         if self.first_timestamp is None:
             self.first_timestamp = at_us // _TRC_STEP_US * _TRC_STEP_US / 1e6
@@ -562,20 +556,13 @@ class _BlfWriter(can.BLFWriter):
         return self.start_timestamp
 
 
-class _Mf4Writer(can.MF4Writer):
-    """Writer of a file that is written as a whole at its end."""
-
-    def flush(self) -> None:
-        """Do nothing, because there are no data to pass yet."""
-
-
 _TEXT: Final[dict[log_file.LogFormat, Any]] = {
     log_file.LogFormat.ASC: _AscWriter,
     log_file.LogFormat.TRC: _TrcWriter,
 }
 _BINARY: Final[dict[log_file.LogFormat, Any]] = {
     log_file.LogFormat.BLF: _BlfWriter,
-    log_file.LogFormat.MF4: _Mf4Writer,
+    log_file.LogFormat.MF4: can.MF4Writer,
 }
 
 _END_US: Final = 16_725_225_600_000_000
@@ -632,7 +619,8 @@ class CanLogWriter:
 
     def flush(self) -> None:
         """Pass all items to the operating system. The end of some formats is still missing."""
-        self._writer.flush()
+        if isinstance(self._writer, _BlfWriter):  # MF4 is written as a whole at its end
+            self._writer.flush()
         self._file.flush()
 
     def close(self) -> None:
