@@ -18,7 +18,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol, Self, TypeGuard
 
@@ -279,8 +279,7 @@ class MonitorSetup:
         """Write the setup to a workspace. Values that the setup lacks are removed."""
         bus: dict[str, Any] = {
             name: (list(value) if isinstance(value, tuple) else value) or None
-            for name in _OPTIONS
-            for value in (getattr(self.options, name),)
+            for name, value in asdict(self.options).items()
         }
         bus["source"] = [_relative(workspace, word) for word in self.source]
         for name, paths in (("dbc", self.dbc), ("eds_dir", self.eds_dir)):
@@ -288,17 +287,10 @@ class MonitorSetup:
             bus[name] = words or None
         workspace.put(_BUS, bus)
         kept = workspace.section(_NODES)
-        gone = {key: {"eds": None} for key, node in kept.items() if "eds" in node}
-        workspace.put(
-            _NODES,
-            {
-                **gone,
-                **{
-                    str(node): {"eds": _relative(workspace, str(path), is_path=True)}
-                    for node, path in sorted(self.eds.items())
-                },
-            },
-        )
+        nodes: dict[str, Any] = {key: {"eds": None} for key, node in kept.items() if "eds" in node}
+        for node, path in sorted(self.eds.items()):
+            nodes[str(node)] = {"eds": _relative(workspace, str(path), is_path=True)}
+        workspace.put(_NODES, nodes)
 
 
 def _folder(workspace: Workspace) -> Path:
