@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -143,8 +142,7 @@ class Lateness:
     """
 
     def __init__(self) -> None:
-        self._exact = array("q", bytes(8 * (_EXACT_US + 1)))
-        self._above: Counter[int] = Counter()
+        self._counts: Counter[int] = Counter()
         self.count = self.max_us = self.last_us = 0
 
     def add(self, late_us: int) -> None:
@@ -152,25 +150,17 @@ class Lateness:
         self.last_us = late_us = max(0, late_us)
         self.count += 1
         self.max_us = max(self.max_us, late_us)
-        if late_us <= _EXACT_US:
-            self._exact[late_us] += 1
-        else:
-            self._above[bucket_of(late_us)] += 1
+        exact = late_us <= _EXACT_US
+        self._counts[late_us if exact else max(_EXACT_US, middle_us(bucket_of(late_us)))] += 1
 
     def percentile_us(self, percent: float) -> int:
         """Return the delay that a percentage, 0 to 100, does not exceed, or 0 without delays."""
         left = self.count * percent / 100
-        for late_us, count in self._counts():
+        for late_us, count in sorted(self._counts.items()):
             left -= count
             if left <= 0:
                 return min(late_us, self.max_us)
         return self.max_us
-
-    def _counts(self) -> Iterator[tuple[int, int]]:
-        """Yield each delay in ascending order, with its number."""
-        yield from enumerate(self._exact)
-        for bucket in sorted(self._above):
-            yield middle_us(bucket), self._above[bucket]
 
     def __str__(self) -> str:
         """Return the statistics in words."""
