@@ -17,7 +17,7 @@ from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import RULES, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.show import diff, entries, head, pdos, table
-from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until_unread
+from tickrig.host.cli.messages import Refused, refusing, say, until_unread
 from tickrig.host.cli.options import PATH, Choice
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
@@ -186,7 +186,8 @@ def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_enc
         for one in fixed.left:
             click.echo(str(fixed.before(one) if output is None else replace(one, file=str(output))))
     if output is not None:
-        _write_mended(output, fixed.document.data)
+        with refusing("-o", path=output):
+            write_whole(output, fixed.document.data)
     say(f"{len(fixed.mended)} fixed, {len(fixed.left)} left")
     if fixed.left:
         click.get_current_context().exit(_LEFT)
@@ -227,15 +228,6 @@ def _differences(old: Document, new: Document) -> Iterator[str]:
     lines = difflib.unified_diff(old.texts, new.texts, old.name, new.name, n=1, lineterm="")
     for line in lines:
         yield "".join(letter if letter.isprintable() else "?" for letter in line)
-
-
-def _write_mended(output: Path, data: bytes) -> None:
-    try:
-        write_whole(output, data)
-    except OSError as error:
-        refuse_path("-o", error)
-    except ValueError as error:
-        raise Refused(f"-o {output}: {error}") from None
 
 
 # The verb `eds show`: the device of a file.

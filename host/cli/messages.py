@@ -13,6 +13,8 @@ import click
 from tickrig.host.cli.start import FULL, raise_of_output
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tickrig.wire.canopen.eds.eds_file import Finding
 
 
@@ -65,18 +67,22 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 
 
 @contextmanager
-def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[None]:
+def refusing(
+    what: str = "", wrong: type[ValueError] = ValueError, *, path: Path | None = None
+) -> Iterator[None]:
     """Turn an error of the block into Refused. An OSError is handled as in `refuse_path`.
 
     Args:
         what: invalid option or argument, which starts the message.
         wrong: class of the error, whose text is the message.
+        path: file that is wrong, if the text of the error does not name it.
     """
     try:
         yield
     except OSError as error:
         refuse_path(what, error)
     except wrong as error:
+        what += f" {path}:" if path else ""
         raise Refused(f"{what} {error}".lstrip()) from None
 
 

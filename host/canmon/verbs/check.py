@@ -44,7 +44,7 @@ from tickrig.host.canmon.sources.source import (
 )
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
+from tickrig.host.cli.messages import Refused, refusing, until_unread
 from tickrig.host.cli.options import PATH, Choice, Decorator, add_options, refuse_idle
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.toml_reader import read_toml
@@ -270,12 +270,8 @@ def _is_empty(rules: Rules) -> bool:
 
 def _file(path: Path) -> RuleValues:
     """Read a file. Check it separately, so that the message names the file."""
-    try:
+    with refusing("rules", path=path):
         return parse_rule_file(path.read_text("utf-8"), load_rule)
-    except OSError as error:
-        refuse_path("rules", error)
-    except ValueError as error:
-        raise Refused(f"rules {path}: {error}") from None
 
 
 _BROKEN: Final = 1
@@ -407,8 +403,7 @@ def command(  # noqa: PLR0913 - options
     unjudged = verdict.nothing_judged() if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
     judged = suite, rules.names(), verdict.findings, why, verdict.none_judged
-    _write("--junit", report_path, junit, judged)
-    _write("--sarif", sarif_path, sarif, judged)
+    _write(report_path, sarif_path, judged)
     said = verdict.doubts() if verdict.counts or not unjudged else []
     listening.report(
         frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said
@@ -533,8 +528,7 @@ class _Usual:
         why = self.source.failed or self._nothing()
         suite = " ".join(self._words)
         judged = suite, list(diagnosis.RULES), findings, why, found.unjudged
-        _write("--junit", junit_path, junit, judged)
-        _write("--sarif", sarif_path, sarif, judged)
+        _write(junit_path, sarif_path, judged)
 
     def _nothing(self) -> str:
         return "" if self._found.frames else _no_frame(self.source, self._words)
@@ -681,9 +675,9 @@ def _one_by_one(
 _Judged = tuple[str, list[str], list[TrafficFinding], str, Mapping[str, str]]
 
 
-def _write(option: str, path: Path | None, text: Callable[..., str], judged: _Judged) -> None:
-    """Write a report if an option requests it."""
-    if path is None:
-        return
-    with refusing(option):
-        write_whole(path, text(*judged))
+def _write(junit_path: Path | None, sarif_path: Path | None, judged: _Judged) -> None:
+    """Write the reports that options request."""
+    for option, path, text in (("--junit", junit_path, junit), ("--sarif", sarif_path, sarif)):
+        if path is not None:
+            with refusing(option):
+                write_whole(path, text(*judged))

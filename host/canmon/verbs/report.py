@@ -34,7 +34,7 @@ from tickrig.host.canmon.sources.source import (
 )
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, refusing
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.whole_file import check_file, write_whole
 
@@ -102,7 +102,7 @@ def command(  # noqa: PLR0913 - options
     outputs = {"-o": page, "--pdf": pdf, "--png": png}
     with refusing():
         _check_outputs(outputs)
-    rules = _learnt([word for word in source if word.endswith(_RULE_FILE)])
+    rules = _learnt([Path(word) for word in source if word.endswith(_RULE_FILE)])
     source = [word for word in source if not word.endswith(_RULE_FILE)]
     bus, objects = BusOptions(**options), decode_options.read_eds_files(eds)
     rates, words = listening.bit_rates_of(source, bus), _named(source)
@@ -112,11 +112,11 @@ def command(  # noqa: PLR0913 - options
             seen = read.whole(lambda: _Seen(objects, dbc, rates, rules))
             verdict = _verdict(seen, read, around)
         finally:
-            read.close()
+            read.source.close()
         about = [
             (f"Written by canmon (tickrig) {__version__} on Python {python_version()}:", ""),
             ("Command:", shlex.join(["canmon", *sys.argv[1:]])),
-            *((text, "") for text in [*read.messages, read.failed] if text),
+            *((text, "") for text in [*read.source.messages(), read.source.failed] if text),
         ]
         head = report_page.ReportHead(title or words, words, about, rates.nominal)
         _write(outputs, report_page.report_page(seen.survey, verdict, head), Path(folder))
@@ -131,17 +131,13 @@ def _named(words: Sequence[str]) -> str:
     return ", ".join(Path(word).name if Path(word).is_file() else word for word in words) or "bus"
 
 
-def _learnt(files: Sequence[str]) -> learnt.Learnt | None:
+def _learnt(files: Sequence[Path]) -> learnt.Learnt | None:
     """Return the rules learnt from a good log, or None without a file."""
     if len(files) > 1:
         raise Refused(f"learnt rules are held alone: leave {files[1]} out")
     for path in files:
-        try:
-            found = learnt.parse_learnt(Path(path).read_text("utf-8"))
-        except OSError as error:
-            refuse_path("rules", error)
-        except ValueError as error:
-            raise Refused(f"rules {path}: {error}") from None
+        with refusing("rules", path=path):
+            found = learnt.parse_learnt(path.read_text("utf-8"))
         if found is None:
             raise Refused(
                 f"rules {path}: no [learnt]: a report takes what canmon check --init writes;"
@@ -265,7 +261,6 @@ class _Reading:
 
     Attributes:
         source: source of the first reading, closed at the end of the reading.
-        messages: messages of the source about lost and invalid frames.
     """
 
     def __init__(
@@ -283,17 +278,7 @@ class _Reading:
             raise Refused("--for is how long a bus is recorded: leave it out for a log")
         if self._recorded:
             self._words, self._cut = [str(folder / "bus.log")], LogCut()
-            self._record(self.source, Path(self._words[0]), words, span_us)
-
-    @property
-    def messages(self) -> list[str]:
-        """Messages of the source about lost frames and items that are not frames."""
-        return self.source.messages()
-
-    @property
-    def failed(self) -> str:
-        """Reason why the source ended early."""
-        return self.source.failed
+            self._record(Path(self._words[0]), span_us)
 
     def whole(self, make: Callable[[], _Seen]) -> _Seen:
         """Read the whole source."""
@@ -301,26 +286,18 @@ class _Reading:
         if log is not None and _in_columns(seen.decoder):
             with closing(log):
                 if seen.by_columns(log):
-                    self._read(log)
+                    if not self._recorded:
+                        self.source = log
                     return seen
             seen = make()
         frames = open_source(self._words, self._bus) if self._recorded else self.source
         with closing(frames):
             seen.by_frames(frames)
-        self._read(frames)
         return seen
-
-    def _read(self, source: AnySource[Any]) -> None:
-        if not self._recorded:
-            self.source = source
 
     def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
         """Return the frames around frames by their numbers, as `excerpts` does."""
         return excerpts(self._pieces(), numbers, frames) if numbers else {}
-
-    def close(self) -> None:
-        """Close the open files."""
-        self.source.close()
 
     def _pieces(self) -> Iterator[Sequence[Record]]:
         source = open_source(self._words, self._bus, self._cut)
@@ -328,21 +305,14 @@ class _Reading:
             while not source.ended:
                 yield source.poll(0)
 
-    @staticmethod
-    def _record(
-        source: AnySource[Any], path: Path, words: Sequence[str], span_us: int | None
-    ) -> None:
-        writer = write_log(path)
+    def _record(self, path: Path, span_us: int | None) -> None:
+        with closing(write_log(path)) as writer, listening.until_interrupted():
 
-        def take(records: Sequence[Record]) -> None:
-            for record in records:
-                writer.write(record)
+            def take(records: Sequence[Record]) -> None:
+                for record in records:
+                    writer.write(record)
 
-        try:
-            with listening.until_interrupted():
-                listening.listen(source, take, span_us)
-        finally:
-            writer.close()
+            listening.listen(self.source, take, span_us)
 
 
 def _in_columns(decoder: Decoder) -> bool:
