@@ -17,12 +17,13 @@ from __future__ import annotations
 import heapq
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
 from itertools import islice, takewhile
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Generic, TypeVar, cast
 
 from tickrig._lazy import LazyModule
@@ -61,11 +62,13 @@ class AnySource(Generic[_Taken_co]):
         failed: reason why the source ended early, empty if it did not.
         marks: events after the frames that `poll` returned last.
         recorded: whether a recorder wrote these marks and has already reported them.
+        buses: buses to send on, by name.
     """
 
     live = recorded = False
     failed = ""
     marks: Sequence[log_file.Mark] = ()
+    buses: Mapping[str, bus_source.OpenBus] = MappingProxyType({})
     _ended = False
     _cut: _CutLog | None = None
 
@@ -671,20 +674,28 @@ def _large_log(words: Sequence[str], cut: LogCut) -> Path | None:
 def open_source(
     words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
 ) -> Source:
-    """Open the source that SOURCE words name, which is one or more buses, files, or standard input.
+    """Open the source that SOURCE words name as `open_any` does, without serial ports."""
+    source = open_any(words, options or BusOptions(), cut, lines_too=False)
+    return cast("Source", source)  # without lines: frames
 
-    Files are merged by time. Buses are read as frames arrive.
+
+def open_any(
+    words: Sequence[str], options: BusOptions, cut: LogCut = _WHOLE, *, lines_too: bool = True
+) -> AnySource[AnyRecord]:
+    """Open the source that SOURCE words name: buses and serial ports, files, or standard input.
+
+    Files are merged by time. Buses and serial ports are read as frames and lines arrive.
 
     Args:
         words: SOURCE words. Without words, the options name a bus.
         options: interface, bit rate and other options of the buses.
         cut: wanted part of the files or of standard input. With a part, a bus is refused.
+        lines_too: whether the source may be a serial port.
 
     Raises:
         Refused: the words do not name a source, or the sources cannot be combined.
         SourceFailed: a bus or file cannot be opened.
     """
-    options = options or BusOptions()
     if not words and not options:
         raise Refused(
             "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
@@ -692,48 +703,25 @@ def open_source(
     parsed = [parse_source(word) for word in words]
     files = [word for word in parsed if isinstance(word, FileSpec)]
     buses = [word for word in parsed if isinstance(word, BusSpec)]
+    lines = [word for word in parsed if isinstance(word, LineSpec)]
     if parsed == [None]:
         return StdinSource(cut=cut)
     if len(files) == len(parsed) > 0:
         return FileSource(files, cut)
     if cut:
         raise Refused(f"{cut} is for a log; {' '.join(words) or 'a bus'} is not a log")
-    if any(isinstance(word, LineSpec) for word in parsed):
+    if lines and not lines_too:
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
-    if len(buses) < len(parsed):
-        raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
-    return cast("Source", open_live(buses or [BusSpec()], [], options)[0])  # buses alone: frames
-
-
-def open_any(
-    words: Sequence[str], options: BusOptions, cut: LogCut = _WHOLE
-) -> AnySource[AnyRecord]:
-    """Open the source of SOURCE words as `open_source` does.
-
-    Serial ports and buses may be mixed.
-    """
-    parsed = [parse_source(word) for word in words]
-    lines = [word for word in parsed if isinstance(word, LineSpec)]
-    if not lines or cut:
-        return open_source(words, options, cut)
-    buses = [word for word in parsed if isinstance(word, BusSpec)]
     if len(buses) + len(lines) < len(parsed):
-        raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
-    return open_live(buses, lines, options)[0]
+        what = "serial ports" if lines else "buses"
+        raise Refused(f"{what}, files and standard input cannot be mixed: {' '.join(words)}")
+    return _open_live(buses if parsed else [BusSpec()], lines, options)
 
 
-def open_live(
+def _open_live(
     buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
-) -> tuple[live_source.LiveSource[AnyRecord], dict[str, bus_source.OpenBus]]:
-    """Open buses and serial ports, so that they can be opened again.
-
-    Returns:
-        The source, and the buses to send on, by name.
-
-    Raises:
-        Refused: python-can does not know an option.
-        SourceFailed: a bus or port cannot be opened.
-    """
+) -> live_source.LiveSource[AnyRecord]:
+    """Open buses and serial ports, so that they can be opened again."""
     opened: dict[str, bus_source.OpenBus] = {}
     readers: list[live_source.Reader[AnyRecord]] = []
     try:
@@ -755,9 +743,10 @@ def open_live(
         if isinstance(error, LinkClosed):
             raise SourceFailed(str(error)) from None
         raise
-    return live_source.LiveSource(
-        readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]
-    ), opened
+    chosen = [*(bus.chosen for bus in buses), *(None for _ in lines)]
+    source = live_source.LiveSource(readers, chosen)
+    source.buses = opened
+    return source
 
 
 def is_live(word: str) -> bool:

@@ -26,16 +26,7 @@ from tickrig.host.canmon.model.trace import FrameTrace
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.model.transmit import AnyFrames
 from tickrig.host.canmon.output.listening import Stopwatch
-from tickrig.host.canmon.sources.source import (
-    STDIN,
-    AnySource,
-    BusSpec,
-    LineSpec,
-    StdinSource,
-    open_any,
-    open_live,
-    parse_source,
-)
+from tickrig.host.canmon.sources.source import STDIN, AnySource, StdinSource, open_any
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import SourceFailed
 from tickrig.wire.can import CanFrame, FdFrame
@@ -374,19 +365,13 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
         Refused: the words do not name a source, or the sources cannot be combined.
         SourceFailed: a bus or file cannot be opened.
     """
-    parsed = [parse_source(word) for word in words]
-    buses = [word for word in parsed if isinstance(word, BusSpec)]
-    lines = [word for word in parsed if isinstance(word, LineSpec)]
-    if parsed == [None]:
+    if list(words) == ["-"]:
         return Session(StdinSource(_take_pipe()), model)
-    if len(buses) + len(lines) < len(parsed) or not (words or options):
-        return Session(open_any(words, options), model)
-    if not lines:
-        buses = buses or [BusSpec()]
-    source, opened = open_live(buses, lines, options)
-    sends = {name: partial(_send, bus) for name, bus in opened.items()}
+    source = open_any(words, options)
+    sends = {name: partial(_send, bus) for name, bus in source.buses.items()}
     session = Session(source, model, sends)
-    session.words = (*options.arguments(), *words[:1])
+    if source.live:
+        session.words = (*options.arguments(), *words[:1])
     return session
 
 
