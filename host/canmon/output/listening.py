@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import TYPE_CHECKING, Final, ParamSpec, Self, TypeVar
 
 import click
@@ -79,12 +79,7 @@ class _Screen:
         self._output.write(ENTER)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *of_block: object) -> None:
         """Restore the terminal."""
         self._output.write(LEAVE, last=True)
         if not self._output.close():
