@@ -499,7 +499,8 @@ class Files:
         if self._index is None:
             self._part = self._begin(now_us)
         else:
-            self._number = max(0, *self._numbers())
+            here = [path.name for path in plan.path.parent.iterdir()]
+            self._number = max(map(plan.number, (*here, *self._index.files)), default=0)
             self._recover(self._index, now_us)
 
     @property
@@ -515,10 +516,10 @@ class Files:
     def store(self, records: Sequence[Record]) -> None:
         """Add frames in the order of arrival."""
         self.frames += len(records)
-        begin = 0
+        begin, limit = 0, self._plan.rotate_bytes
         while begin < len(records) and not self.ended:
             part = self._part_for(records[begin])
-            end = min(begin + min(_BLOCK_FRAMES, max(1, self._room(part))), len(records))
+            end = min(begin + min(_BLOCK_FRAMES, max(1, part.room(limit))), len(records))
             # The first frame of the next part is the one that is due; it begins that part,
             # not this one.
             end = self._up_to_due(part, records, begin, end)
@@ -599,12 +600,11 @@ class Files:
             part = self._part = self._begin(record.at_us)
         return part
 
-    def _room(self, part: _RecordingPart) -> int:
-        return part.room(self._plan.rotate_bytes)
-
     def _is_full(self, part: _RecordingPart, at_us: int) -> bool:
-        if self._index is None or self._room(part) <= 0:
-            return self._index is not None
+        if self._index is None:
+            return False
+        if part.room(self._plan.rotate_bytes) <= 0:
+            return True
         after_us, first_us = self._plan.rotate_us, part.first_us
         return after_us is not None and first_us is not None and at_us - first_us >= after_us
 
@@ -631,11 +631,6 @@ class Files:
             self._index.write(_OPEN, at_us, file=path.name)
         self.parts += 1
         return _RecordingPart(path)
-
-    def _numbers(self) -> list[int]:
-        assert self._index is not None, "there are numbers where there is an index"
-        here = [path.name for path in self._plan.path.parent.iterdir()]
-        return [self._plan.number(name) for name in (*here, *self._index.files)] or [0]
 
     def _recover(self, index: _Index, now_us: int) -> None:
         """Add files to the index that a killed recorder did not complete."""
