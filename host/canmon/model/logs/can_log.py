@@ -556,11 +556,9 @@ class _BlfWriter(can.BLFWriter):
         return self.start_timestamp
 
 
-_TEXT: Final[dict[log_file.LogFormat, Any]] = {
+_WRITERS: Final[dict[log_file.LogFormat, Any]] = {
     log_file.LogFormat.ASC: _AscWriter,
     log_file.LogFormat.TRC: _TrcWriter,
-}
-_BINARY: Final[dict[log_file.LogFormat, Any]] = {
     log_file.LogFormat.BLF: _BlfWriter,
     log_file.LogFormat.MF4: can.MF4Writer,
 }
@@ -588,10 +586,10 @@ class CanLogWriter:
         self._numbers = BusNumbers()
         self._passed_over: Counter[str] = Counter()
         self._file: Any = log_file.open_log(path, "wb")
-        if kind in _TEXT:
+        if kind in (log_file.LogFormat.ASC, log_file.LogFormat.TRC):
             self._file = _Text(self._file, str(path))
         try:
-            self._writer: Any = (_TEXT | _BINARY)[kind](self._file)
+            self._writer: Any = _WRITERS[kind](self._file)
         except NotImplementedError as error:
             self._file.close()
             path.unlink()
