@@ -25,7 +25,7 @@ from tickrig.host.canmon.conform.stimulus import (
 )
 from tickrig.host.canmon.eds_document import chosen_eds, read_device_document
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
+from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -132,23 +132,20 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 # The decoded frames of a conformance check, as in `canmon dump`.
 
 
-def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
+def decoded_frames(eds: Mapping[int, Path]) -> ShowFrames:
     """Return a function that formats the frames of a check and their meaning as lines.
 
     Each call knows only the EDS at its beginning. Transfers and mappings of earlier checks do not
     count, because the frames between two checks are not recorded.
 
     Args:
-        eds: EDS, or the result of reading an EDS, by node-ID.
+        eds: EDS by node-ID.
 
     Raises:
         OSError: an EDS cannot be read.
         EdsError: an EDS is malformed.
     """
-    known = {
-        node: read_eds_objects(item, node) if isinstance(item, Path) else item
-        for node, item in eds.items()
-    }
+    known = {node: read_eds_objects(path, node) for node, path in eds.items()}
 
     def show(lines: Sequence[FrameLine]) -> list[str]:
         shown, decoder = list[str](), Decoder(known)
