@@ -32,7 +32,6 @@ class _LogHead:
         kind: format of the log.
         compressed: whether the log is compressed with gzip.
         size_bytes: size of the file.
-        frames: number of frames, or None if only a scan would find it.
         head_frames: number of frames read from the beginning of the log.
         channels: names of the buses in these frames.
         first_us: time of the first frame, or None if there is no frame.
@@ -43,7 +42,6 @@ class _LogHead:
     kind: log_file.LogFormat
     compressed: bool
     size_bytes: int
-    frames: int | None
     head_frames: int
     channels: tuple[str, ...]
     first_us: int | None
@@ -86,7 +84,6 @@ def read_head(path: Path) -> _LogHead:
         kind,
         compressed,
         path.stat().st_size,
-        len(head) if whole else None,
         len(head),
         tuple(dict.fromkeys(record.channel for record in head)),
         head[0].at_us if head else None,
@@ -171,7 +168,7 @@ def _json(path: Path, head: _LogHead) -> str:
         "format": head.kind.value,
         "gzip": head.compressed,
         "bytes": head.size_bytes,
-        "frames": head.frames,
+        "frames": head.head_frames if head.whole else None,
         "channels": head.channels,
         "first": None if head.first_us is None else head.first_us / 1e6,
         "last": None if head.last_us is None else head.last_us / 1e6,
