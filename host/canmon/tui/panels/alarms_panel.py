@@ -73,12 +73,7 @@ class AlarmTask(Task):
         return ()
 
 
-_USUAL: Final = {
-    "no_emcy": True,
-    "no_error_frames": True,
-    "no_lost_heartbeat": True,
-    "no_loss": True,
-}
+_USUAL: Final = dict.fromkeys(("no_emcy", "no_error_frames", "no_lost_heartbeat", "no_loss"), True)
 """Default rules. Bus-off is also an error frame."""
 _USUAL_LOAD: Final = {"max_load": 90}
 """Default limit of the load, used if the bit rate is known."""
@@ -149,12 +144,9 @@ class AlarmsPanel(Panel):
         self._lines, self._targets = rules, [None, *(one.finding for one in alarms.rows())]
         self._targets += [None] * (len(rules) - len(self._targets))
         width = max(LEAST_WIDTH, self.query_one(LineView).scrollable_content_region.width)
-        before = [one.at_us for one in alarms.findings]
-        for finding, before_us in zip(
-            reversed(alarms.findings),
-            reversed([self.session.origin_us, *before[:-1]]),
-            strict=False,
-        ):
+        before = [self.session.origin_us, *(one.at_us for one in alarms.findings)]
+        pairs = list(zip(alarms.findings, before, strict=False))
+        for finding, before_us in reversed(pairs):
             parts = _wrapped(self._finding(finding, before_us), width)
             self._lines += parts
             self._targets += [finding] * len(parts)
