@@ -12,7 +12,7 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, show_findings
+from tickrig.host.cli.messages import Refused, refusing, say, show_findings
 from tickrig.host.cli.options import PATH
 
 if TYPE_CHECKING:
@@ -44,14 +44,8 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documen
         what: argument or option that names the file.
         encoding: Python name of the file's encoding, or empty to detect the encoding.
     """
-    try:
+    with refusing(what, path=path), refusing(what, eds_file.EdsError):
         data = eds.read_eds_bytes(path)
-    except OSError as error:
-        refuse_path(what, error)
-    except eds_file.EdsError as error:
-        raise Refused(f"{what} {error}") from None
-    except ValueError as error:
-        raise Refused(f"{what} {path}: {error}") from None
     if _is_binary(data):
         raise Refused(f"{what} {path}: a binary file: no EDS")
     is_other = b"[" not in data[:_LOOKED_AT] or path.suffix.lower() in _YAML_ENDINGS
