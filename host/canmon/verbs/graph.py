@@ -7,7 +7,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -132,15 +132,12 @@ def _size(context: click.Context, parameter: click.Parameter, text: str) -> tupl
 
 def _range(text: str) -> tuple[int, tuple[float, float]]:
     match = _RANGE.fullmatch(text)
-    try:
-        if match is None:
-            raise ValueError
-        low, high = float(match[2]), float(match[3])
-        if not low < high:
-            raise ValueError
-    except ValueError:
-        raise Refused(f"--range {text!r} is not AXIS=LOW..HIGH, as 1=-5..5") from None
-    return int(match[1]), (low, high)
+    with suppress(ValueError):
+        if match is not None:
+            low, high = float(match[2]), float(match[3])
+            if low < high:
+                return int(match[1]), (low, high)
+    raise Refused(f"--range {text!r} is not AXIS=LOW..HIGH, as 1=-5..5")
 
 
 _MOST: Final = 2_000_000
