@@ -291,10 +291,9 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
             f" type before the value, as u16:100; types: {', '.join(_TYPES)}"
         )
     try:
-        data = encode_value(text, words)
+        return encode_value(text, words)
     except ValueError as error:
         raise Refused(f"{objects.title(entry)}: {error}{_range(text)}") from None
-    return data
 
 
 def _range(text: node_memory.ObjectText) -> str:
