@@ -17,7 +17,6 @@ from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
 from tickrig.wire import can
-from tickrig.wire.errors import WireError
 
 _BUS_ERROR: Final = can.ErrorFrame(can.ErrorClass.BUS_ERROR)
 """Meaning of `ErrorFrame` in a line, which does not name the error as linux/can/error.h does."""
@@ -104,12 +103,7 @@ class _AscLines:
             return self._head(text, tally) if _SILENT.match(text) else None
         seconds, fraction, event = timed.groups()
         self._advance(int(seconds) * 1_000_000 + (int(f"{fraction:0<9}") + 500) // 1_000)
-        try:
-            return self._event(event, tally)
-        except WireError:
-            return tally.pass_over(log_file.BAD_FRAMES)
-        except (ValueError, LookupError):
-            return None
+        return self._event(event, tally)
 
     def _head(self, text: str, tally: log_file.LogTally) -> str:
         """Read a line without a time, which describes the lines after it."""

@@ -543,7 +543,9 @@ class _LineParser(Protocol):
         """Return a frame, another item of the line, or None for an invalid line.
 
         Raises:
-            ValueError: the file is not a log of this format.
+            LogError: the file is not a log of this format.
+            WireError: the line has a frame that CAN cannot have.
+            ValueError, LookupError: the line is invalid.
         """
 
 
@@ -572,8 +574,12 @@ class LineLogReader:
         for number, line in enumerate(self._lines(), 1):
             try:
                 found = lines.read(line, tally)
-            except ValueError as error:
+            except WireError:
+                found = tally.pass_over(log_file.BAD_FRAMES)
+            except log_file.LogError as error:
                 raise log_file.LogError(f"{self._path} is no {self._kind} log: {error}") from error
+            except (ValueError, LookupError):
+                found = None
             if isinstance(found, Record):
                 at_us = found.at_us
                 if marks:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
@@ -19,7 +20,6 @@ from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_file import END_S
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
 from tickrig.wire import can
-from tickrig.wire.errors import WireError
 
 _VERSIONS: Final = {
     "1.0": ("N", "O", "I", "L", "D"),
@@ -78,8 +78,7 @@ class _Row(NamedTuple):
 
     def hex_bytes(self) -> bytes:
         """Return the data up to the first word that is not a byte, such as `--` or `BUSHEAVY`."""
-        count = next((n for n, word in enumerate(self.data) if not _BYTE.fullmatch(word)), None)
-        return bytes.fromhex("".join(self.data[:count]))
+        return bytes.fromhex("".join(takewhile(_BYTE.fullmatch, self.data)))
 
 
 class _TrcLines:
@@ -93,7 +92,7 @@ class _TrcLines:
         """Return a frame, another item of the line, or None for an invalid line.
 
         Raises:
-            ValueError: the columns are unknown.
+            LogError: the columns are unknown.
         """
         text = line.strip()
         if not text or text.startswith(";"):
@@ -101,16 +100,11 @@ class _TrcLines:
                 self._head(head[1].upper(), head[2].rstrip(";"), tally)
             return text
         if not self._columns:
-            raise ValueError("File has no column information: ;$COLUMNS= is missing")
+            raise log_file.LogError("File has no column information: ;$COLUMNS= is missing")
         number, *words = text.split()
         if not _NUMBER.fullmatch(number) or not words:
             return None
-        try:
-            return self._row(number, words, tally)
-        except WireError:
-            return tally.pass_over(log_file.BAD_FRAMES)
-        except (ValueError, LookupError):
-            return None
+        return self._row(number, words, tally)
 
     def _head(self, word: str, value: str, tally: log_file.LogTally) -> None:
         """Read a header line, which describes the file."""
