@@ -1,12 +1,7 @@
-r"""The tab of the graph, with curves of signals from a bus or a log.
-
->>> _colour_line("━ \x1b[36mspeed\x1b[0m 3")
-(('━ ', ''), ('speed', 'cyan'), (' 3', ''))
-"""
+"""The tab of the graph, with curves of signals from a bus or a log."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -35,15 +30,6 @@ _COLOURS: Final = {
     "35": "magenta",
     "36": "cyan",
 }
-_CODE: Final = re.compile("\x1b\\[([0-9]*)m")
-
-
-def _colour_line(text: str) -> Line:
-    """Return a line with its colours. A colour lasts until the next code."""
-    pieces = _CODE.split(text)
-    codes = ("", *pieces[1::2])
-    found = zip(pieces[::2], codes, strict=True)
-    return tuple((part, _COLOURS.get(code, "")) for part, code in found if part)
 
 
 class GraphTask(Task):
@@ -119,7 +105,9 @@ class GraphPanel(panel.Panel):
         self.graph.first_us, self.graph.stamp = self.session.origin_us, self.session.stamp
         width, height = self.query_one(panel.PictureView).size
         if self.graph.words:
-            self._lines = [_colour_line(line) for line in self.graph.render(width, height)]
+            self._lines = [
+                panel.ansi_line(line, _COLOURS) for line in self.graph.render(width, height)
+            ]
         else:
             self._lines = [((_EMPTY, ""),)]
 

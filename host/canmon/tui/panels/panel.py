@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -187,6 +188,21 @@ class PictureView(LineView, inherit_bindings=False):
     def on_click(self, event: Click) -> None:
         """Report the position of the click."""
         self.post_message(self.Pointed(event.x))
+
+
+_CODE: Final = re.compile("\x1b\\[([0-9]*)m")
+
+
+def ansi_line(text: str, styles: Mapping[str, str]) -> Line:
+    r"""Return a line with the styles of its ANSI codes. A style lasts until the next code.
+
+    >>> ansi_line("01 \x1b[7mFF\x1b[0m", {"7": "bold yellow"})
+    (('01 ', ''), ('FF', 'bold yellow'))
+    """
+    pieces = _CODE.split(text)
+    codes = ("", *pieces[1::2])
+    found = zip(pieces[::2], codes, strict=True)
+    return tuple((part, styles.get(code, "")) for part, code in found if part)
 
 
 # The base class of tabs, which is the contract between the app and its panels.

@@ -1,8 +1,4 @@
-r"""The tab of the statistics of all identifiers: rates, gaps, jitter, missed cycles and bits.
-
->>> _ansi_line("01 \x1b[7mFF\x1b[0m")
-(('01 ', ''), ('FF', 'bold yellow'))
-"""
+"""The tab of the statistics of all identifiers: rates, gaps, jitter, missed cycles and bits."""
 
 from __future__ import annotations
 
@@ -13,22 +9,15 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.model.top_model import PLAIN, REVERSE, UNBOUNDED, RowOrder
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.model.top_model import UNBOUNDED, RowOrder
+from tickrig.host.canmon.tui.panels.panel import Panel, ansi_line, read_help
 from tickrig.host.canmon.tui.panels.trace_panel import CHANGED
 from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.canmon.workspace import choice, truth
 from tickrig.host.tui import Line, LineView, plain
 
-
-def _ansi_line(text: str) -> Line:
-    """Return a line with its styles. Reversed text has changed."""
-    pieces = []
-    for part in text.split(REVERSE):
-        marked, found, rest = part.partition(PLAIN)
-        pieces += [(marked, CHANGED), (rest, "")] if found else [(part, "")]
-    return tuple(piece for piece in pieces if piece[0])
-
+_STYLES: Final = {"7": CHANGED}
+"""Reversed text has changed."""
 
 _TITLE: Final = "CAN-ID"
 """Text in the last line above the rows."""
@@ -68,7 +57,7 @@ class StatisticsPanel(Panel):
         lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
         heads = next((number for number, line in enumerate(lines, 1) if _TITLE in line), 0)
         self._heads = [plain(line, "bold") for line in lines[:heads]]
-        self._lines = [_ansi_line(line) for line in lines[heads:]]
+        self._lines = [ansi_line(line, _STYLES) for line in lines[heads:]]
 
     def paint(self) -> None:
         """Show the snapshot."""
