@@ -587,7 +587,7 @@ class CanLogWriter:
         self._passed_over: Counter[str] = Counter()
         self._file: Any = log_file.open_log(path, "wb")
         if kind in (log_file.LogFormat.ASC, log_file.LogFormat.TRC):
-            self._file = _Text(self._file, str(path))
+            self._file = io.TextIOWrapper(self._file, "utf-8", newline="")
         try:
             self._writer: Any = _WRITERS[kind](self._file)
         except NotImplementedError as error:
@@ -636,18 +636,6 @@ class CanLogWriter:
         if isinstance(self._writer, _BlfWriter) and self._writer.early:
             said.append(f"{named}: {self._writer.early} frames from before its start moved there")
         return said
-
-
-class _Text(io.TextIOWrapper):
-    """A text file that knows its path, which the header of TRC needs."""
-
-    def __init__(self, file: Any, name: str) -> None:
-        super().__init__(file, "utf-8", newline="")
-        self._name = name
-
-    @property
-    def name(self) -> str:
-        return self._name
 
 
 def _not_held(record: Record, kind: log_file.LogFormat) -> str:
