@@ -80,7 +80,6 @@ class LogFile:
         self._kept = kept
         self._watch, self._live = Stopwatch(), live
         try:
-            log_format(plan.path)
             self.recorder = Recorder(plan, self._now_us, triggers, wanted)
         except (LogFormatError, LogError) as error:
             raise Refused(str(error)) from None
