@@ -81,8 +81,6 @@ LEAST_WIDTH, INDENT = 40, 4
 _BADGE_S: Final = 0.5
 _BADGES: Final = {AlarmState.BROKEN: ("!", "bold red"), AlarmState.WAS_BROKEN: ("!", "yellow")}
 
-_STYLES: Final = {AlarmState.BROKEN: "bold red", AlarmState.WAS_BROKEN: "yellow"}
-
 
 class AlarmsPanel(Panel):
     """A list of rules and findings."""
@@ -261,5 +259,5 @@ def _rules_toml(words: Mapping[str, Any]) -> str:
 def _styled(line: str) -> Line:
     if line.startswith((f"{RULE} ", "FINDINGS")):
         return plain(line, "bold")
-    found = next((style for state, style in _STYLES.items() if f" {state} " in line), "")
+    found = next((style for state, (_, style) in _BADGES.items() if f" {state} " in line), "")
     return plain(line, found)
