@@ -47,9 +47,7 @@ class _GatewayErrorCode(IntEnum):
 
     NOT_SUPPORTED = 100
     SYNTAX = 101
-    INTERNAL_STATE = 102
     TIME_OUT = 103
-    NO_DEFAULT_NET = 104
     NO_DEFAULT_NODE = 105
     UNSUPPORTED_NET = 106
     UNSUPPORTED_NODE = 107
@@ -60,33 +58,19 @@ class _GatewayErrorCode(IntEnum):
     LSS_STORE = 504
 
 
-_TEXTS: Final = {
-    _GatewayErrorCode.NOT_SUPPORTED: "request not supported",
-    _GatewayErrorCode.SYNTAX: "syntax error",
-    _GatewayErrorCode.INTERNAL_STATE: "not possible now",
-    _GatewayErrorCode.TIME_OUT: "no answer in time",
-    _GatewayErrorCode.NO_DEFAULT_NET: "no default net is set",
-    _GatewayErrorCode.NO_DEFAULT_NODE: "no default node is set",
-    _GatewayErrorCode.UNSUPPORTED_NET: "there is no such net",
-    _GatewayErrorCode.UNSUPPORTED_NODE: "there can be no such node",
-    _GatewayErrorCode.LOST_CONNECTION: "the bus is gone",
-    _GatewayErrorCode.LSS_MANUFACTURER: "LSS: an error of the maker of the slave",
-    _GatewayErrorCode.LSS_NODE_ID: "LSS: the slave does not take this node-ID",
-    _GatewayErrorCode.LSS_BIT_RATE: "LSS: the slave does not take this bit rate",
-    _GatewayErrorCode.LSS_STORE: "LSS: the slave cannot store",
-}
+OK: Final = "OK"
 
 
 class GatewayError(Exception):
     """A command that the gateway does not execute.
 
     Args:
+        text: reason in words.
         code: error code of the reason.
-        text: reason in words. If it is empty, the text of the code is used.
     """
 
-    def __init__(self, code: _GatewayErrorCode, text: str = "") -> None:
-        super().__init__(text or _TEXTS[code])
+    def __init__(self, text: str, code: _GatewayErrorCode = _GatewayErrorCode.SYNTAX) -> None:
+        super().__init__(text)
         self.code = code
 
 
@@ -128,18 +112,14 @@ def parse_request(line: str) -> _GatewayRequest | None:
         return None
     head = _SEQUENCE.match(line)
     if head is None or int(head[1]) > _MAX_NUMBER:
-        raise GatewayError(
-            _GatewayErrorCode.SYNTAX, "a command begins with its number, for example [1]"
-        )
+        raise GatewayError("a command begins with its number, for example [1]")
     words, numbers = _words(line[head.end() :]), list[int]()
     while words and words[0][:1].isdecimal():
         if len(numbers) == _MOST_NUMBERS:
-            raise GatewayError(
-                _GatewayErrorCode.SYNTAX, "at most net and node may precede a command"
-            )
+            raise GatewayError("at most net and node may precede a command")
         numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
     if not words:
-        raise GatewayError(_GatewayErrorCode.SYNTAX, "the command is missing")
+        raise GatewayError("the command is missing")
     return _GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
 
 
@@ -150,14 +130,14 @@ def number(word: str, most: int, what: str, least: int = 0) -> int:
     except ValueError:
         value = -1
     if not (least <= value <= most and word.isascii() and word.isalnum()):
-        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{what} {word!r} is not {least}..{most}")
+        raise GatewayError(f"{what} {word!r} is not {least}..{most}")
     return value
 
 
 def _one_of(word: str, words: Collection[str], what: str) -> str:
     """Return one of the known words, in lower case."""
     if (lower := word.lower()) not in words:
-        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{what} {word!r}; known: {known(words)}")
+        raise GatewayError(f"{what} {word!r}; known: {known(words)}")
     return lower
 
 
@@ -165,9 +145,7 @@ def _check_count(request: _GatewayRequest, least: int, most: int | None) -> None
     """Refuse a command whose number of words after the verb is not from `least` to `most`."""
     count = len(request.words)
     if count < least or (most is not None and count > most):
-        raise GatewayError(
-            _GatewayErrorCode.SYNTAX, f"{request.verb} with {count} arguments; see help"
-        )
+        raise GatewayError(f"{request.verb} with {count} arguments; see help")
 
 
 def _words(text: str) -> list[str]:
@@ -176,7 +154,7 @@ def _words(text: str) -> list[str]:
     while at < len(text):
         found = _WORD.match(text, at)
         if found is None:
-            raise GatewayError(_GatewayErrorCode.SYNTAX, "a quote is not closed")
+            raise GatewayError("a quote is not closed")
         if found[2]:
             break
         words.append(found[3] if found[1] is None else found[1].replace('""', '"'))
@@ -187,28 +165,12 @@ def _words(text: str) -> list[str]:
 HEX: Final = "hex"
 """Data type for bytes, which is the type of CANopenNode, and the format if no type is given."""
 
+_SIZES: Final = range(8, 65, 8)
 NUMBERS: Final = {
     "b": DataType.BOOLEAN,
-    "i8": DataType.INTEGER8,
-    "i16": DataType.INTEGER16,
-    "i24": DataType.INTEGER24,
-    "i32": DataType.INTEGER32,
-    "i40": DataType.INTEGER40,
-    "i48": DataType.INTEGER48,
-    "i56": DataType.INTEGER56,
-    "i64": DataType.INTEGER64,
-    "u8": DataType.UNSIGNED8,
-    "u16": DataType.UNSIGNED16,
-    "u24": DataType.UNSIGNED24,
-    "u32": DataType.UNSIGNED32,
-    "u40": DataType.UNSIGNED40,
-    "u48": DataType.UNSIGNED48,
-    "u56": DataType.UNSIGNED56,
-    "u64": DataType.UNSIGNED64,
-    "x8": DataType.UNSIGNED8,
-    "x16": DataType.UNSIGNED16,
-    "x32": DataType.UNSIGNED32,
-    "x64": DataType.UNSIGNED64,
+    **{f"i{bits}": DataType[f"INTEGER{bits}"] for bits in _SIZES},
+    **{f"u{bits}": DataType[f"UNSIGNED{bits}"] for bits in _SIZES},
+    **{f"x{bits}": DataType[f"UNSIGNED{bits}"] for bits in (8, 16, 32, 64)},
     "r32": DataType.REAL32,
     "r64": DataType.REAL64,
 }
@@ -245,9 +207,7 @@ def encode(name: str, words: Sequence[str]) -> bytes:
             return b64decode(word, validate=True)
         return NUMBERS[name].encode(float(word) if name in REALS else _integer(word))
     except (ValueError, FieldError, Error):
-        raise GatewayError(
-            _GatewayErrorCode.SYNTAX, f"{text!r} is not a value of type {name}"
-        ) from None
+        raise GatewayError(f"{text!r} is not a value of type {name}") from None
 
 
 def decode(name: str, data: bytes) -> str:
@@ -281,11 +241,9 @@ def _integer(word: str) -> int:
 
 # LSS over a gateway: node-ID and bit rate of slaves (CiA 309-3, CiA 305).
 
-_LSS_OK: Final = "OK"
 _UNCONFIGURED: Final = 255
 _MOST_NODE_ID: Final = 127
 _MOST_DELAY_MS: Final = 0xFFFF
-_MOST: Final = 0xFFFF_FFFF
 _FAILED: Final = {
     LssCommand.CONFIGURE_NODE_ID: _GatewayErrorCode.LSS_NODE_ID,
     LssCommand.CONFIGURE_BIT_TIMING: _GatewayErrorCode.LSS_BIT_RATE,
@@ -316,83 +274,65 @@ def carry_out(bus: NodeBus, request: _GatewayRequest) -> str:
     scan_us = SCAN_US
     if request.verb in _SCANS and request.words:
         scan_us = 1_000 * number(request.words[0], _MOST_DELAY_MS, "time-out", 1)
+    do, least, most = _CARRIED_OUT[request.verb]
+    _check_count(request, least, most)
+    numbers = [number(word, _MAX_NUMBER, "number") for word in request.words]
     try:
-        return _CARRIED_OUT[request.verb](LssMaster(bus, scan_us=scan_us), request)
+        return do(LssMaster(bus, scan_us=scan_us), *numbers) or OK
     except LssFailed as error:
         code = _GatewayErrorCode.TIME_OUT
         if error.code and error.command is not None:
             code = _FAILED.get(error.command, _GatewayErrorCode.LSS_MANUFACTURER)
         if error.code == _SPECIFIC:
             code = _GatewayErrorCode.LSS_MANUFACTURER
-        raise GatewayError(code, str(error)) from None
+        raise GatewayError(str(error), code) from None
 
 
-def _switch_all(lss: LssMaster, request: _GatewayRequest) -> str:
-    (mode,) = _numbers(request, 1)
+def _switch_all(lss: LssMaster, mode: int) -> None:
     lss.switch_all(LssMode(_within(mode, 0, 1)))
-    return _LSS_OK
 
 
-def _select(lss: LssMaster, request: _GatewayRequest) -> str:
-    if not lss.select(LssAddress(*_numbers(request, 4))):
-        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave has this address")
-    return _LSS_OK
+def _select(lss: LssMaster, *address: int) -> None:
+    if not lss.select(LssAddress(*address)):
+        raise GatewayError("no slave has this address", _GatewayErrorCode.TIME_OUT)
 
 
-def _set_node(lss: LssMaster, request: _GatewayRequest) -> str:
-    (node_id,) = _numbers(request, 1)
+def _set_node(lss: LssMaster, node_id: int) -> None:
     lss.configure_node_id(
         node_id if node_id == _UNCONFIGURED else _within(node_id, 1, _MOST_NODE_ID)
     )
-    return _LSS_OK
 
 
-def _configure_bit_rate(lss: LssMaster, request: _GatewayRequest) -> str:
-    table, index = _numbers(request, 2)
+def _configure_bit_rate(lss: LssMaster, table: int, index: int) -> None:
     if table != STANDARD_TABLE or index not in BIT_RATES:
-        raise GatewayError(_GatewayErrorCode.LSS_BIT_RATE, f"table {table} has no bit rate {index}")
+        raise GatewayError(f"table {table} has no bit rate {index}", _GatewayErrorCode.LSS_BIT_RATE)
     lss.configure_bit_rate(BIT_RATES[index])
-    return _LSS_OK
 
 
-def _activate(lss: LssMaster, request: _GatewayRequest) -> str:
-    (delay_ms,) = _numbers(request, 1)
+def _activate(lss: LssMaster, delay_ms: int) -> None:
     lss.activate_bit_rate(_within(delay_ms, 0, _MOST_DELAY_MS))
-    return _LSS_OK
 
 
-def _store(lss: LssMaster, request: _GatewayRequest) -> str:
-    _numbers(request, 0)
-    lss.store()
-    return _LSS_OK
-
-
-def _address(lss: LssMaster, request: _GatewayRequest) -> str:
-    wanted = _numbers(request, 0, 1)
+def _address(lss: LssMaster, *wanted: int) -> str:
     address = lss.address()
     return f"0x{address[_within(wanted[0], 0, 3)]:08X}" if wanted else _text(address)
 
 
-def _node(lss: LssMaster, request: _GatewayRequest) -> str:
-    _numbers(request, 0)
+def _node(lss: LssMaster) -> str:
     return f"0x{lss.node_id():02X}"
 
 
-def _scan(lss: LssMaster, request: _GatewayRequest) -> str:
-    _numbers(request, 0, 1)
+def _scan(lss: LssMaster, _timeout_ms: int = 0) -> str:
     if (address := lss.fastscan()) is None:
-        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave lacks a node-ID")
+        raise GatewayError("no slave lacks a node-ID", _GatewayErrorCode.TIME_OUT)
     return _text(address)
 
 
-def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
+def _all_nodes(lss: LssMaster, *numbers: int) -> str:
     """Assign a node-ID to each slave without one. List the node-IDs before OK."""
-    words = _numbers(request, 0, 3)
-    if len(words) == 2:
-        raise GatewayError(
-            _GatewayErrorCode.SYNTAX, "the first node is followed by 0 or 1: store or not"
-        )
-    (node_id, store), said = words[1:] or (2, 1), list[str]()
+    if len(numbers) == 2:
+        raise GatewayError("the first node is followed by 0 or 1: store or not")
+    (node_id, store), said = numbers[1:] or (2, 1), list[str]()
     with lss.at_work():
         while (address := lss.fastscan()) is not None:
             lss.configure_node_id(_within(node_id, 1, _MOST_NODE_ID))
@@ -401,32 +341,31 @@ def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
             lss.switch_all(LssMode.WAITING)
             said.append(f"# Node-ID {node_id} assigned to: {_text(address)}")
             node_id += 1
-    return "\n".join([*said, _LSS_OK])
+    return "\n".join([*said, OK])
 
 
-_CARRIED_OUT: Final[dict[str, Callable[[LssMaster, _GatewayRequest], str]]] = {
-    "lss_switch_glob": _switch_all,
-    "lss_switch_sel": _select,
-    "lss_set_node": _set_node,
-    "lss_conf_bitrate": _configure_bit_rate,
-    "lss_activate_bitrate": _activate,
-    "lss_store": _store,
-    "lss_inquire_addr": _address,
-    "lss_get_node": _node,
-    "_lss_fastscan": _scan,
-    "lss_allnodes": _all_nodes,
+_CARRIED_OUT: Final[dict[str, tuple[Callable[..., str | None], int, int]]] = {
+    "lss_switch_glob": (_switch_all, 1, 1),
+    "lss_switch_sel": (_select, 4, 4),
+    "lss_set_node": (_set_node, 1, 1),
+    "lss_conf_bitrate": (_configure_bit_rate, 2, 2),
+    "lss_activate_bitrate": (_activate, 1, 1),
+    "lss_store": (LssMaster.store, 0, 0),
+    "lss_inquire_addr": (_address, 0, 1),
+    "lss_get_node": (_node, 0, 0),
+    "_lss_fastscan": (_scan, 0, 1),
+    "lss_allnodes": (_all_nodes, 0, 3),
 }
+"""Functions of the verbs, and how many numbers follow a verb: at least, and at most.
+
+A function without an answer of its own is answered by OK.
+"""
 LSS_VERBS: Final = tuple(_CARRIED_OUT)
-
-
-def _numbers(request: _GatewayRequest, least: int, most: int | None = None) -> tuple[int, ...]:
-    _check_count(request, least, least if most is None else most)
-    return tuple(number(word, _MOST, "number") for word in request.words)
 
 
 def _within(value: int, least: int, most: int) -> int:
     if not least <= value <= most:
-        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{value} is not {least}..{most}")
+        raise GatewayError(f"{value} is not {least}..{most}")
     return value
 
 
@@ -434,7 +373,6 @@ def _text(address: LssAddress) -> str:
     return " ".join(f"0x{part:08X}" for part in address)
 
 
-OK: Final = "OK"
 _NODES: Final = 127
 _MOST_TIMEOUT_MS: Final = 0xFFFF
 _NMT_VERBS: Final = {
@@ -510,7 +448,7 @@ class Gateway:
         verb = self._verbs.get(request.verb)
         if verb is None:
             raise GatewayError(
-                _GatewayErrorCode.NOT_SUPPORTED, f"{request.verb!r} is not supported"
+                f"{request.verb!r} is not supported", _GatewayErrorCode.NOT_SUPPORTED
             )
         return verb(request)
 
@@ -520,17 +458,17 @@ class Gateway:
         self._check_net(net)
         if node == -1:
             if self._node is None:
-                raise GatewayError(_GatewayErrorCode.NO_DEFAULT_NODE)
+                raise GatewayError("no default node is set", _GatewayErrorCode.NO_DEFAULT_NODE)
             return self._node
         if not least <= node <= _NODES:
             text = f"node {node} is not {least}..{_NODES}"
-            raise GatewayError(_GatewayErrorCode.UNSUPPORTED_NODE, text)
+            raise GatewayError(text, _GatewayErrorCode.UNSUPPORTED_NODE)
         return node
 
     def _check_net(self, net: list[int]) -> None:
         if net and net[0] != self._net:
             text = f"there is no net {net[0]}, this one is {self._net}"
-            raise GatewayError(_GatewayErrorCode.UNSUPPORTED_NET, text)
+            raise GatewayError(text, _GatewayErrorCode.UNSUPPORTED_NET)
 
     def _read(self, request: _GatewayRequest) -> str:
         node = self._node_of(request, 1)
@@ -566,7 +504,7 @@ class Gateway:
         self._check_net(list(request.numbers))
         _check_count(request, 1, None)
         if (name := request.words[0].lower()) not in _SETTINGS:
-            raise GatewayError(_GatewayErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
+            raise GatewayError(f"set {name!r} is not supported", _GatewayErrorCode.NOT_SUPPORTED)
         _check_count(request, 2, 2)
         value = request.words[1]
         match name:
