@@ -120,9 +120,13 @@ class Report:
     doubt: str = ""
     absent: bool = False
 
+    def with_verdict(self, *verdicts: CheckVerdict) -> list[Result]:
+        """Return the results whose verdict is one of these, in the order of the run."""
+        return [result for result in self.results if result.outcome.verdict in verdicts]
+
     def count(self, verdict: CheckVerdict) -> int:
         """Return the number of checks with this verdict."""
-        return sum(result.outcome.verdict is verdict for result in self.results)
+        return len(self.with_verdict(verdict))
 
     @property
     def exit_status(self) -> int:
@@ -130,15 +134,15 @@ class Report:
 
         0: all pass, 1: a failure, 4: inconclusive or blocked, 5: nothing judged.
         """
-        if self.count(CheckVerdict.FAIL):
+        return self.exit_status_with(self.count(CheckVerdict.FAIL))
+
+    def exit_status_with(self, failures: int) -> int:
+        """Return the exit status of the run if only so many failures count."""
+        if failures:
             return FAILED
-        if (
-            self.count(CheckVerdict.INCONCLUSIVE)
-            or self.count(CheckVerdict.BLOCKED)
-            or self.aborted
-        ):
+        if self.aborted or self.with_verdict(CheckVerdict.INCONCLUSIVE, CheckVerdict.BLOCKED):
             return UNDECIDED
-        return 0 if self.count(CheckVerdict.PASS) else NOTHING_JUDGED
+        return 0 if self.with_verdict(CheckVerdict.PASS, CheckVerdict.FAIL) else NOTHING_JUDGED
 
 
 FAILED: Final = 1

@@ -52,37 +52,17 @@ class Baseline:
 
     def new(self, report: verdict.Report) -> list[verdict.Result]:
         """Return the failures that are not in the baseline."""
-        failed = (
-            result
-            for result in report.results
-            if result.outcome.verdict is verdict.CheckVerdict.FAIL
-        )
+        failed = report.with_verdict(verdict.CheckVerdict.FAIL)
         return [result for result in failed if not self.knows(result)]
 
     def mended(self, report: verdict.Report) -> list[str]:
         """Return the ids of known failures that pass now."""
-        passed = {
-            one.check.id
-            for one in report.results
-            if one.outcome.verdict is verdict.CheckVerdict.PASS
-        }
-        return sorted(self.known & passed)
+        passed = report.with_verdict(verdict.CheckVerdict.PASS)
+        return sorted(self.known.intersection(result.check.id for result in passed))
 
     def exit_status(self, report: verdict.Report) -> int:
         """Return the exit status of a run, in which known failures do not count."""
-        if self.new(report):
-            return verdict.FAILED
-        if (
-            report.aborted
-            or report.count(verdict.CheckVerdict.INCONCLUSIVE)
-            or report.count(verdict.CheckVerdict.BLOCKED)
-        ):
-            return verdict.UNDECIDED
-        return (
-            0
-            if report.count(verdict.CheckVerdict.PASS) or report.count(verdict.CheckVerdict.FAIL)
-            else verdict.NOTHING_JUDGED
-        )
+        return report.exit_status_with(len(self.new(report)))
 
     def ends_with(self, report: verdict.Report) -> int:
         """Return the exit status of the command. If the run ended early, the reason decides."""
@@ -98,8 +78,7 @@ def baseline_text(report: verdict.Report) -> str:
     """Write the failures of a report as a baseline, in the order of their ids."""
     failed = {
         result.check.id: f"{result.check.id}  # {one_line(result.check.title)}"
-        for result in report.results
-        if result.outcome.verdict is verdict.CheckVerdict.FAIL
+        for result in report.with_verdict(verdict.CheckVerdict.FAIL)
     }
     return "\n".join([_HEAD, *(failed[name] for name in sorted(failed)), ""])
 

@@ -41,11 +41,7 @@ def issue_text(
         baseline: baseline of known failures, which are omitted.
         show: function that formats frames.
     """
-    failed = [
-        result
-        for result in report.results
-        if result.outcome.verdict is verdict.CheckVerdict.FAIL and not baseline.knows(result)
-    ]
+    failed = baseline.new(report)
     parts = ["\n".join(_head(report, len(failed)))]
     parts += ["\n".join(_failure(report, result, show)) for result in failed]
     return "\n\n".join(parts) + "\n"

@@ -189,7 +189,7 @@ def by_clause(report: Report) -> list[_GroupRow]:
 
 def unwell(report: Report) -> list[Result]:
     """Return the results that need attention. The worst results are first."""
-    found = [result for result in report.results if result.outcome.verdict in UNWELL]
+    found = report.with_verdict(*UNWELL)
     return sorted(found, key=lambda result: UNWELL.index(result.outcome.verdict))
 
 

@@ -74,8 +74,7 @@ def _not_applicable(report: Report) -> list[str]:
     """Return why checks were not applicable. The most frequent reason is first."""
     reasons = Counter(
         one_line(result.outcome.reason)
-        for result in report.results
-        if result.outcome.verdict is CheckVerdict.NOT_APPLICABLE
+        for result in report.with_verdict(CheckVerdict.NOT_APPLICABLE)
     )
     if not reasons:
         return []
