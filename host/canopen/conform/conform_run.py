@@ -319,9 +319,9 @@ class ConformRun:
             if patient:
                 self._restore(patient=False)
             else:
-                self._care.give_up()
+                self._care.state.give_up()
         except LinkClosed:
-            self._care.give_up()
+            self._care.state.give_up()
         with suppress(KeyboardInterrupt, LinkClosed, StepFailed):
             self._look_again()
 
@@ -334,7 +334,9 @@ class ConformRun:
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
         stray = [self._stray.finding] if self._stray.finding else []
         findings = tuple(dict.fromkeys((*self._crashes, *self._client.misnamed, *stray, *findings)))
-        repairs = tuple(f"{i:04X}h:{s:02X}={_typed(data)}" for (i, s), data in self._care.repairs)
+        repairs = tuple(
+            f"{i:04X}h:{s:02X}={_typed(data)}" for (i, s), data in self._care.state.repairs
+        )
         gone = (self._stray.unrestored,) if self._stray.unrestored else ()
         return Report(
             self._source,
@@ -344,7 +346,7 @@ class ConformRun:
             node=subject.about if subject else {},
             settings=_describe_settings(self._plan, self._exchange.others),
             findings=findings,
-            unrestored=(*self._care.unrestored, *gone),
+            unrestored=(*self._care.state.unrestored, *gone),
             repairs=repairs,
             duration_us=self._exchange.now_us - self._exchange.start_us,
             aborted=aborted,

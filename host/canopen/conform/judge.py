@@ -175,7 +175,7 @@ class Judge:
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):
                 self._permission.check_write(index, refused=True)
-            if _HISTORY in bound.changed and any(self._care.held(_HISTORY)):
+            if _HISTORY in bound.changed and any(self._care.state.held(_HISTORY)):
                 self._permission.check_confirmed(_EMPTIED)
             for question in sorted(bound.questions):
                 self._permission.check_confirmed(question)
@@ -190,8 +190,8 @@ class Judge:
         action = step.action
         if not isinstance(action, Hold) or action.value is None:
             return step
-        at = action.address
-        if not self._care.is_quieted(at) or self._care.held(at).hex().upper() != action.value:
+        at, state = action.address, self._care.state
+        if not state.is_quieted(at) or state.held(at).hex().upper() != action.value:
             return step
         return step._replace(action=replace(action, value=None))
 

@@ -107,6 +107,10 @@ class KnownState:
         for at in left:
             self._begin[at] = self.original[at]
 
+    def held(self, at: Address) -> bytes:
+        """Return the value of an object before the run; empty if it is unknown."""
+        return self.original.get(at, b"")
+
     def is_quieted(self, at: Address) -> bool:
         """Return whether an object has another value in checks than before the run."""
         return self._begin.get(at) != self.original.get(at)
@@ -252,13 +256,12 @@ class KnownState:
             answer = attempt()
         except SdoTimeout:
             self._silent += 1
-            if self._silent >= PATIENCE:
-                self._silent = 0
-                raise
-            return None
-        except SdoMisnamed:
+            if self._silent < PATIENCE:
+                return None
             self._silent = 0
-            return None
+            raise
+        except SdoMisnamed:
+            answer = None
         except SdoAborted:
             self._silent = 0
             raise
@@ -310,6 +313,8 @@ class NodeCare:
         level: level of the run. On READ_ONLY, the node is only read.
 
     Attributes:
+        state: values of the node before the run, and in checks.
+        errors: the bits of the error register that were set before the run and are still set.
         lost: whether the node no longer answers.
     """
 
@@ -317,16 +322,11 @@ class NodeCare:
         self, exchange: BusExchange, client: SdoClient, node_id: int, level: Level
     ) -> None:
         self._exchange, self._client, self._node_id = exchange, client, node_id
-        self._level, self._state = level, KnownState(exchange, client)
+        self._level, self.state = level, KnownState(exchange, client)
         self._nmt_state: NmtState | None = None
         self._moved = False  # into another NMT state than before
-        self._errors = 0
+        self.errors = 0
         self._stored = self.lost = False
-
-    @property
-    def unrestored(self) -> tuple[str, ...]:
-        """Objects that could not be restored, one per line."""
-        return tuple(self._state.unrestored)
 
     def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
         """Record the state of the node. Bring the node into the state in which checks begin.
@@ -338,12 +338,12 @@ class NodeCare:
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
-        self._state.learn(addresses, held)
+        self.state.learn(addresses, held)
         self._nmt_state = self._learn_state()
         self._moved = True
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        self._state.prepare()
-        self._errors = self._client.number(*_ERROR_REGISTER) or 0
+        self.state.prepare()
+        self.errors = self._client.number(*_ERROR_REGISTER) or 0
 
     def begin(self, bound: BoundCheck) -> None:
         """Record unknown values that a check may change. Set `lost` if that fails."""
@@ -352,52 +352,30 @@ class NodeCare:
         self._exchange.begin(_CARE_US)
         self._stored = self._stored or bool(_STORAGE & {index for index, _ in bound.changed})
         try:
-            self._state.learn(bound.written)
-            self._state.write(bound.written)
+            self.state.learn(bound.written)
+            self.state.write(bound.written)
             if bound.resets:
-                self._state.reset()
-            self._state.forget()
+                self.state.reset()
+            self.state.forget()
         except (SdoFailed, StepFailed):
             self._recover()
 
     def unread(self, addresses: Set[Address]) -> list[Address]:
         """Return the objects that could not be read, and therefore cannot be restored."""
         self._exchange.begin(_CARE_US)
-        known = self._state.original
+        known = self.state.original
         try:
-            self._state.learn(at for at in addresses if at[0] not in _STORAGE)
+            self.state.learn(at for at in addresses if at[0] not in _STORAGE)
         except (SdoFailed, StepFailed):
             return []  # the node is gone, which `begin` will detect
         return sorted(at for at in addresses - known.keys() if at[0] not in _STORAGE)
-
-    @property
-    def repairs(self) -> tuple[Write, ...]:
-        """Writes that restore the remaining objects, in this order."""
-        return tuple(self._state.repairs)
-
-    @property
-    def errors(self) -> int:
-        """The bits of the error register that were set before the run and are still set."""
-        return self._errors
-
-    def is_quieted(self, at: Address) -> bool:
-        """Return whether the tester has replaced the original value of an object for its checks."""
-        return self._state.is_quieted(at)
-
-    def held(self, at: Address) -> bytes:
-        """Return the value of an object before the run; empty if it is unknown."""
-        return self._state.original.get(at, b"")
-
-    def give_up(self) -> None:
-        """Report an object that cannot be restored."""
-        self._state.give_up()
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
         """Restore the node after a check. Return False if that fails. The node is then lost."""
         booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
         storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
         if storing:
-            self._state.stored |= bound.written
+            self.state.stored |= bound.written
         kinds = storing.union(bound.resets)
         if crashed or booted > len(bound.resets):
             kinds.clear()
@@ -414,9 +392,9 @@ class NodeCare:
             return
         self._exchange.begin(_CARE_US)
         if not self._put_back():
-            self._state.forget()
+            self.state.forget()
             if not (self._answers(_GONE_MS) and self._put_back()):
-                self._state.give_up()
+                self.state.give_up()
 
     def _put_back(self) -> bool:
         """Restore all values. Return False if the node does not answer."""
@@ -424,7 +402,7 @@ class NodeCare:
             self._client.abort()
             if self._moved:
                 self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
-            self._state.restore()
+            self.state.restore()
             if self._stored:
                 self._store()
             if self._nmt_state in _TO_STATE:
@@ -438,7 +416,7 @@ class NodeCare:
         try:
             self._client.download(*_STORE, _SAVE)
         except (SdoAborted, SdoMisnamed) as error:
-            self._state.unrestored[f"what a check stored is still stored: {error}"] = None
+            self.state.unrestored[f"what a check stored is still stored: {error}"] = None
 
     def _tidy(self, written: Collection[Address], resets: Collection[str] | None = None) -> None:
         """Recover the node. `resets` has the meaning of `KnownState.tidy_after`, or is None."""
@@ -449,13 +427,13 @@ class NodeCare:
             return
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         if resets is None:
-            self._state.tidy(written)
+            self.state.tidy(written)
         else:
-            self._state.tidy_after(resets, written)
+            self.state.tidy_after(resets, written)
         if self._has_errors():
             self._command(NmtCommand.RESET_COMMUNICATION)
             self._answers(_RETURN_MS)
-            self._state.tidy_after({_RESET_COMMUNICATION}, written)
+            self.state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
         """Return whether a check caused a new error. Earlier errors may have disappeared."""
@@ -463,8 +441,8 @@ class NodeCare:
         if number is None:
             self._probe()  # is the object absent, or the node gone?
             return False
-        new = number & ~self._errors
-        self._errors &= number
+        new = number & ~self.errors
+        self.errors &= number
         return bool(new)
 
     def _probe(self) -> None:
@@ -491,9 +469,7 @@ class NodeCare:
         until_us = self._exchange.now_us + within_ms * MS_US
         while True:
             try:
-                self._client.upload(*_DEVICE_TYPE)
-            except (SdoAborted, SdoMisnamed):
-                return True
+                self._probe()
             except SdoTimeout:
                 if self._exchange.now_us >= until_us:
                     return False
@@ -503,9 +479,9 @@ class NodeCare:
 
     def _learn_state(self) -> NmtState | None:
         """Read the NMT state from a heartbeat, which is switched on for this purpose."""
-        if HEARTBEAT not in self._state.original:  # it could not be restored
+        if HEARTBEAT not in self.state.original:  # it could not be restored
             return None
-        self._state.write({HEARTBEAT})
+        self.state.write({HEARTBEAT})
         try:
             self._client.download(*HEARTBEAT, _PROBE_MS.to_bytes(2, "little"))
             pattern = f"{ERROR_CONTROL_COB_ID + self._node_id:03X}#.."
@@ -520,5 +496,5 @@ class NodeCare:
         except NotAllowed:
             return
         if command in _RESETS:
-            self._state.forget()
+            self.state.forget()
         self._exchange.wait(_SETTLE_MS)
