@@ -46,12 +46,8 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
     request = sdo_frame.BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
     first = SdoRequest(request, index, sub)
     begun = yield from _request(first, sdo_frame.BlockDownloadInitiateResponse)
-    block_size, total, taken, idle = (
-        begun.block_size,
-        max(1, -(-len(data) // sdo_frame.SEGMENT_BYTES)),
-        0,
-        0,
-    )
+    total = max(1, -(-len(data) // sdo_frame.SEGMENT_BYTES))
+    block_size, taken, idle = begun.block_size, 0, 0
     while taken < total:
         if not 1 <= block_size <= sdo_frame.MAX_BLOCK_SIZE:
             yield from _abort(index, sub, sdo_frame.AbortCode.BLOCK_SIZE)

@@ -101,11 +101,8 @@ def _pdo(pdo: int, left: Values, number: _Number) -> Iterator[Write]:
 
 def _sync(left: Values, number: _Number) -> Iterator[Write]:
     """Stop the SYNC producer, write counter and period, and restart an enabled producer."""
-    given, before, cycle = (
-        left.pop((_SYNC, 0), None),
-        number((_SYNC, 0)),
-        left.pop((_CYCLE, 0), None),
-    )
+    given, before = left.pop((_SYNC, 0), None), number((_SYNC, 0))
+    cycle = left.pop((_CYCLE, 0), None)
     if cycle is None and (_SYNC_COUNTER, 0) in left and (known := number((_CYCLE, 0))) is not None:
         cycle = _u32(known)
     if before is not None:

@@ -285,12 +285,10 @@ class BusExchange:
         self._permit = permit
         self._boot_up = data_frame(ERROR_CONTROL_COB_ID + node_id, bytes(1))
         self.start_us = self._known_us = self._busy_us = link.now_us
-        self._reserved = frozenset(("000", f"{sdo_frame.REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
-        self._request, self._response = (
-            sdo_frame.REQUEST_COB_ID + node_id,
-            sdo_frame.RESPONSE_COB_ID + node_id,
-        )
+        self._request = sdo_frame.REQUEST_COB_ID + node_id
+        self._response = sdo_frame.RESPONSE_COB_ID + node_id
+        self._reserved = frozenset(("000", f"{self._request:03X}"))
         self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
         self._multiplexer, self.transfer, self._ready_us = b"", bytes(sdo_frame.FRAME_BYTES), 0
         self.unanswered: list[bytes] = []
@@ -442,14 +440,11 @@ class BusExchange:
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
         if wrong := _off_period(stamps, each_ms, times, self.resolution_us):
-            late_us = (
-                (stamps[-1] - stamps[0]) // (len(stamps) - 1) - each_ms * MS_US if stamps[1:] else 0
-            )
+            periods = max(1, len(stamps) - 1)
+            late_us = (stamps[-1] - stamps[0]) // periods - each_ms * MS_US if stamps else 0
             if self._shared_host and 0 < late_us <= self._late_us:
-                late = (
-                    f"this host was late by {self._late_us / MS_US:.1f} ms, and the node runs on it"
-                )
-                raise Disturbed(f"{pattern} {wrong}; {late}")
+                late = f"this host was late by {self._late_us / MS_US:.1f} ms"
+                raise Disturbed(f"{pattern} {wrong}; {late}, and the node runs on it")
             raise StepFailed(f"{pattern} {wrong}")
 
     def collect(self, pattern: str, for_ms: int) -> list[int]:

@@ -132,10 +132,8 @@ class SdoFrames:
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
         self.exchange = exchange
-        self._request, self._response = (
-            sdo_frame.REQUEST_COB_ID + node_id,
-            f"{sdo_frame.RESPONSE_COB_ID + node_id:03X}",
-        )
+        self._request = sdo_frame.REQUEST_COB_ID + node_id
+        self._response = f"{sdo_frame.RESPONSE_COB_ID + node_id:03X}"
 
     def say(self, data: bytes) -> None:
         """Send a request."""
@@ -167,10 +165,8 @@ class SdoFrames:
             return
         self.answer(f"41{multiplexer(at)}{size.to_bytes(4, 'little').hex().upper()}")
         for number, start in enumerate(range(0, max(1, size), sdo_frame.SEGMENT_BYTES)):
-            toggle, part = (
-                (number & 1) << 4,
-                data[2 * start : 2 * (start + sdo_frame.SEGMENT_BYTES)],
-            )
+            toggle = (number & 1) << 4
+            part = data[2 * start : 2 * (start + sdo_frame.SEGMENT_BYTES)]
             self.say(bytes([0x60 | toggle, *bytes(7)]))
             last = start + sdo_frame.SEGMENT_BYTES >= size
             head = toggle | (sdo_frame.SEGMENT_BYTES - len(part) // 2) << 1 | last
