@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, NamedTuple
@@ -38,6 +38,8 @@ _LAST_SUB: Final = 0xFE
 
 _Place = tuple[int, int]
 """Index and sub-index."""
+_MayWrite = Callable[[int], bool]
+"""Function that returns whether an object may be written, by its index."""
 
 
 class _AbsentPlaces(NamedTuple):
@@ -131,37 +133,24 @@ class Binding:
 
     Attributes:
         device: objects in the EDS, or the objects that answered.
-        bound: the objects by name.
-        reasons: reasons in words for each name that is not bound, by name.
-        findings: contradictions between EDS and node, one per line.
         known: whether the objects come from an EDS.
         entries: entries of the dictionary by index and sub-index.
         reader: reader that has read the objects.
+        bound: the objects by name.
+        reasons: reasons in words for each name that is not bound, by name.
     """
 
     device: EdsDevice
-    bound: Mapping[str, Bound]
-    reasons: Mapping[str, str]
-    findings: tuple[str, ...]
     known: bool
     entries: Mapping[_Place, EntryDescription]
     reader: ObjectReader
-
-
-@dataclass(slots=True)
-class _Search:
-    """The search for the objects of the names."""
-
-    device: EdsDevice
-    reader: ObjectReader
-    allow: Collection[int]
-    never: Collection[int]
-    known: bool
-    entries: Mapping[_Place, EntryDescription]
-    facts: list[EntryFacts]
     bound: dict[str, Bound] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
-    findings: list[str] = field(default_factory=list)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Contradictions between EDS and node, one per line."""
+        return tuple(self.reader.findings)
 
 
 def bind(
@@ -191,47 +180,54 @@ def bind(
     Raises:
         SdoTimeout: the node does not answer.
     """
+
+    def may_write(index: int) -> bool:
+        """Return whether an object may be written, with a value or to provoke a refusal."""
+        return index not in never and (index not in PROFILE_AREA or index in allow)
+
     reader = ObjectReader(upload)
     found = device or probe_device(reader)
     entries = {(entry.index, entry.sub): entry for entry in found.entries}
+    binding = Binding(found, device is not None, entries, reader)
     facts = facts_of(found.entries)
-    search = _Search(found, reader, allow, never, device is not None, entries, facts)
     for wanted in WANTED:
-        _bind_object(search, wanted)
+        _bind_object(binding, wanted, facts, may_write)
     for places in _absent_places(found, reader):
-        _bind_absent(search, places)
-    pdos, missing = bind_pdos(found, reader, lambda index: _may_write(search, index))
-    search.bound.update(pdos)
-    search.reasons.update(missing)
-    findings = (*reader.findings, *search.findings)
-    bound, reasons = search.bound, search.reasons
-    return Binding(found, bound, reasons, findings, search.known, entries, reader)
+        _bind_absent(binding, places, may_write)
+    pdos, missing = bind_pdos(found, reader, may_write)
+    binding.bound.update(pdos)
+    binding.reasons.update(missing)
+    return binding
 
 
-def _bind_object(search: _Search, wanted: WantedObject) -> None:
+def _bind_object(
+    binding: Binding, wanted: WantedObject, facts: list[EntryFacts], may_write: _MayWrite
+) -> None:
     """Take the best object that matches, may be used as the check needs, and can be read."""
     if wanted.at is None:
-        fitting = wanted.fitting(search.facts)
+        fitting = wanted.fitting(facts)
     else:
-        fitting = [search.entries[wanted.at]] if wanted.at in search.entries else []
+        fitting = [binding.entries[wanted.at]] if wanted.at in binding.entries else []
     if not fitting:
-        where = "the EDS has no" if search.known else "without an EDS there is no known"
-        search.reasons[wanted.name] = f"{where} {wanted.what}"
+        where = "the EDS has no" if binding.known else "without an EDS there is no known"
+        binding.reasons[wanted.name] = f"{where} {wanted.what}"
         return
-    free = [entry for entry in fitting if wanted.use is not Use.WRITE or _is_free(search, entry)]
-    safe = [entry for entry in free if wanted.use is Use.READ or _may_write(search, entry.index)]
+    free = [entry for entry in fitting if wanted.use is not Use.WRITE or _is_free(binding, entry)]
+    safe = [entry for entry in free if wanted.use is Use.READ or may_write(entry.index)]
     if not safe:
-        search.reasons[wanted.name] = (
+        binding.reasons[wanted.name] = (
             _unsafe(wanted, free[0]) if free else _not_free(wanted, fitting)
         )
         return
     for entry in sorted(safe, key=partial(_order, wanted)):
-        value = search.reader.read(entry) if entry.readable else None
+        value = binding.reader.read(entry) if entry.readable else None
         if (value is not None or not entry.readable) and len(value or b"") in wanted.lengths:
-            search.bound[wanted.name] = BoundObject(entry, value)
+            binding.bound[wanted.name] = BoundObject(entry, value)
             return
     first = f"{safe[0].index:04X}h:{safe[0].sub:02X}"
-    search.reasons[wanted.name] = f"no {wanted.what}: {first} and similar objects have other values"
+    binding.reasons[wanted.name] = (
+        f"no {wanted.what}: {first} and similar objects have other values"
+    )
 
 
 def _unsafe(wanted: WantedObject, entry: EntryDescription) -> str:
@@ -246,19 +242,12 @@ def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
     return f"no {wanted.what} accepts any value: values of {where} have a meaning"
 
 
-def _is_free(search: _Search, entry: EntryDescription) -> bool:
+def _is_free(binding: Binding, entry: EntryDescription) -> bool:
     """Return whether an object accepts every value of its type. Few profile objects do."""
     if entry.index not in PROFILE_AREA:
         return True
-    profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
+    profile = (binding.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
     return profile == GENERIC_IO and entry.index in PLAIN_OUTPUTS
-
-
-def _may_write(search: _Search, index: int) -> bool:
-    """Return whether an object may be written, either with a value or to provoke a refusal."""
-    if index in search.never:
-        return False
-    return index not in PROFILE_AREA or index in search.allow
 
 
 def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, ...]:
@@ -271,34 +260,34 @@ def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, .
     return (area, narrow, entry.signed, -len(entry.default) if is_text else 0, entry.key)
 
 
-def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
+def _bind_absent(binding: Binding, places: _AbsentPlaces, may_write: _MayWrite) -> None:
     """Take a place that must be unused but is used, so that the checks report this error.
 
     If the node uses no such place, take the first unused place. If the node has an object at every
     place, take any place.
     """
-    certain = [place for place in places.certain if _may_write(search, place[0])]
-    there = [place for place in certain if _has_something(search, place)]
+    certain = [place for place in places.certain if may_write(place[0])]
+    there = [place for place in certain if _has_something(binding, place)]
     for place in [*there, *certain, *places.likely]:
-        if not _may_write(search, place[0]):
+        if not may_write(place[0]):
             continue
-        if place in there or search.reader.has_nothing(*place):
-            search.bound[places.name] = BoundPlace(*place)
+        if place in there or binding.reader.has_nothing(*place):
+            binding.bound[places.name] = BoundPlace(*place)
             return
-        if place not in certain and _has_something(search, place):
+        if place not in certain and _has_something(binding, place):
             there.append(place)
     if there:
-        search.bound[places.name] = BoundPlace(*there[0])
+        binding.bound[places.name] = BoundPlace(*there[0])
     else:
-        search.reasons[places.name] = f"the node has no {places.what}"
+        binding.reasons[places.name] = f"the node has no {places.what}"
 
 
-def _has_something(search: _Search, place: _Place) -> bool:
+def _has_something(binding: Binding, place: _Place) -> bool:
     """Read a place that should be unused. An answer is a finding."""
-    if not isinstance(search.reader.try_read(*place), bytes):
+    if not isinstance(binding.reader.try_read(*place), bytes):
         return False
-    why = "is not described" if search.known else "cannot be there"
-    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} {why}, but the node has it")
+    why = "is not described" if binding.known else "cannot be there"
+    binding.reader.findings.append(f"{place[0]:04X}h:{place[1]:02X} {why}, but the node has it")
     return True
 
 
