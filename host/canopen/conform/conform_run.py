@@ -134,8 +134,8 @@ _LISTEN_MS: Final = 1_000
 _EXAMINE_US: Final = 120_000_000
 """The longest time for reading the node before the first check."""
 
-_INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
-"""Names of integer types by the size of a value in bytes."""
+_INTEGERS: Final = range(1, 9)
+"""Sizes in bytes of the values that are written as integers."""
 
 _MOST_CRASHES: Final = 20
 """Number of different crashes of the node's program to report."""
@@ -322,12 +322,9 @@ class ConformRun:
                 self._care.state.give_up()
         except LinkClosed:
             self._care.state.give_up()
-        with suppress(KeyboardInterrupt, LinkClosed, StepFailed):
-            self._look_again()
-
-    def _look_again(self) -> None:
         if self._plan.level > Level.READ_ONLY:
-            self._stray.look_again()
+            with suppress(KeyboardInterrupt, LinkClosed, StepFailed):
+                self._stray.look_again()
 
     def _report(self, aborted: str) -> Report:
         subject = self._subject
@@ -361,6 +358,6 @@ def _any(group: str, place: str) -> bool:
 
 def _typed(data: bytes) -> str:
     """Write a value in the notation of `canmon net write`."""
-    if kind := _INTEGERS.get(len(data)):
-        return f"{kind}:0x{int.from_bytes(data, 'little'):X}"
+    if len(data) in _INTEGERS:
+        return f"u{8 * len(data)}:0x{int.from_bytes(data, 'little'):X}"
     return f"hex:{data.hex().upper()}"

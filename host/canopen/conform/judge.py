@@ -197,7 +197,7 @@ class Judge:
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
         """Return why the objects of a check could not be restored, or an empty text."""
-        written = bound.changed & subject.has | bound.written & subject.values
+        written = bound.changed & subject.entries.keys() | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""
         places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)

@@ -112,6 +112,8 @@ MAP: Final = "map"
 _ENABLE: Final = "enable"
 _REFUSE_SEGMENTS: Final = "refusesegments"
 _FOLLOW: Final = "follow"
+_PARAMETERS: Final = {_ENABLE: (1,), MAP: (1, 2)}
+"""Sub-indices of the communication parameter that a macro writes, by its first words."""
 TO_MAPPING: Final = 0x200
 """Distance of a mapping parameter from its communication parameter."""
 
@@ -128,20 +130,11 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
     """
     if name in _DOWNLOADS or name in {_FOLLOW, _REFUSE_SEGMENTS}:
         return (words[0],)
-    if name == _ENABLE:
-        communication = words[0][0]
-        entries = ((communication + TO_MAPPING, sub) for sub in range(len(words) - 1))
-        return ((communication, 1), *entries)
-    if name == MAP:
-        communication = words[0][0]
-        entries = ((communication + TO_MAPPING, sub) for sub in range(len(words) - 2))
-        return ((communication, 1), (communication, 2), *entries)
+    if name in _PARAMETERS:
+        (index, _), subs = words[0], _PARAMETERS[name]
+        entries = range(len(words) - len(subs))
+        return (*((index, sub) for sub in subs), *((index + TO_MAPPING, sub) for sub in entries))
     return ()
-
-
-def _longest_action_ms(name: str, words: Sequence[Any]) -> int:
-    """Return the longest duration of a bound macro."""
-    return _LONGEST_MS[name](words)
 
 
 def _transfer(words: Sequence[Any]) -> int:
@@ -428,7 +421,7 @@ def _longest_ms(action: Action) -> int:
         case Period(_, ms, times):
             return ms * (times + 2)
         case Macro(name, words):
-            return _longest_action_ms(name, words)
+            return _LONGEST_MS[name](words)
         case Act():
             return _STIMULUS_MS
         case Send() | Forget() | Keep():

@@ -149,7 +149,8 @@ class _Maker:
             if constant is None:
                 yield from self._default(entry)
         else:
-            yield _check(entry, "read", "refused to be read", _ACCESS, _refuse_read(entry))
+            refused = check.RefuseRead((entry.index, entry.sub), _WRITE_ONLY)
+            yield _check(entry, "read", "refused to be read", _ACCESS, refused)
         if self._may_write(entry.index):
             if not entry.writable:
                 yield _refused(entry, "write", "read-only: refused to be written", 0, _READ_ONLY)
@@ -290,10 +291,6 @@ def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
 def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
     """Return the codes that refuse a write because of the value or because the object is in use."""
     return (*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())]),)
-
-
-def _refuse_read(entry: EntryDescription) -> check.RefuseRead:
-    return check.RefuseRead((entry.index, entry.sub), _WRITE_ONLY)
 
 
 def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> check.Check:

@@ -152,7 +152,6 @@ _DRIVE: Final = range(0x603F, 0x6100)
 _HIGHEST_NODE_ID: Final = 127
 _HEARTBEAT: Final = (0x1017, 0)
 _BEATS_MS: Final = (100, 90, 110)
-_IDENTITY_NAMES: Final = ("vendor", "product", "revision", "serial")
 
 _ReadNumber = Callable[[int, int], int | None]
 """Function that reads an unsigned number of the node by index and sub-index, or returns None."""
@@ -271,7 +270,7 @@ def _heartbeat_time(binding: Binding, number: _ReadNumber) -> str:
 
 
 def _identity(number: _ReadNumber) -> dict[str, str]:
-    numbers = {name: number(0x1018, sub) for sub, name in enumerate(_IDENTITY_NAMES, 1)}
+    numbers = {name: number(0x1018, sub) for sub, name in enumerate(_IDENTITY, 1)}
     texts = {name: _u32(value) for name, value in numbers.items() if value is not None}
     others = {name: value for name, value in numbers.items() if value is not None}
     texts |= {f"other_{name}": _u32(value ^ 1) for name, value in others.items()}
@@ -333,9 +332,8 @@ class Subject:
         features: features of the node.
         names: the values of the names in checks.
         about: properties that the node reports, by name, in words.
-        has: objects of the node by index and sub-index. The mapping is computed once, because this
-            takes a tenth of a run.
-        values: objects that can be read and written.
+        values: objects that can be read and written. They are found once, because this takes a
+            tenth of a run.
         refused: the mandatory objects that the node refuses to read.
     """
 
@@ -343,7 +341,6 @@ class Subject:
     features: NodeFeatures
     names: _NodeNames
     about: dict[str, str]
-    has: frozenset[check.Address]
     values: frozenset[check.Address]
     refused: frozenset[check.Address]
 
@@ -356,7 +353,7 @@ class Subject:
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
             if at in self.refused and judge != bound.check.id:
                 return f"the node has no {where}: {judge}"
-            if at not in self.has and at[0] not in _INDICES:
+            if at not in self.entries and at[0] not in _INDICES:
                 return f"{self._where(at[0])} {where}"
         return None
 
@@ -448,10 +445,10 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     features = find_features(binding, client, claims)
     reader = binding.reader  # what it has read is not read again: a sixth of what is read here
     names = _NodeNames(node_id, binding, reader.number, others)
-    has, entries = frozenset(binding.entries), binding.entries.items()
+    entries = binding.entries.items()
     values = frozenset([at for at, entry in entries if entry.readable and entry.writable])
     refused = frozenset([at for at in _MANDATORY if reader.number(*at) is None])
-    return Subject(binding, features, names, dict(_about(reader)), has, values, refused)
+    return Subject(binding, features, names, dict(_about(reader)), values, refused)
 
 
 def _sizes(device: EdsDevice) -> SizeOf:
