@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, BusWrite, DriveChannel
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
 from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
@@ -64,8 +64,8 @@ def check_node_ids(
         place = section.place_of("node_id")
         if slave.node_id in taken:
             who, where = taken[slave.node_id]
-            text = f"node_id: {slave.node_id} is also the node-ID of {who}: {where}"
-            section.note("node-id-twice", "node_id", text)
+            text = f"{slave.node_id} is also the node-ID of {who}: {where}"
+            section.wrong("node-id-twice", "node_id", text)
         taken.setdefault(slave.node_id, (section.name, place))
 
 
@@ -104,21 +104,16 @@ def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
     return one is not None and one is not other and one.node_id == other.node_id
 
 
-def _final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
-    """Return the place of the last write to each entry. The key is index << 8 | sub-index."""
-    return {write.index << 8 | write.sub_index: write.place for write in writes}
-
-
 def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
     """Yield name, CAN-ID, place and slave of enabled PDOs with 11-bit CAN-IDs, TPDOs first."""
     for transmit in (True, False):
         for slave in slaves.values():
-            places = _final_places(slave.writes)
+            places = {(write.index, write.sub_index): write.place for write in slave.writes}
             for pdo in slave.pdos:
                 if pdo.transmit is not transmit or pdo.cob_id & (INVALID | EXTENDED):
                     continue
                 index = (TPDO if transmit else RPDO) + pdo.number - 1
-                place = places.get(index << 8 | 1, slave.place)
+                place = places.get((index, 1), slave.place)
                 kind = "TPDO" if transmit else "RPDO"
                 yield f"{kind} {pdo.number}", pdo.cob_id & CAN_ID_MASK, place, slave, transmit
 
@@ -168,8 +163,7 @@ def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
         for key, allowed in SETTINGS.items():
             item = section.fields.get(key)
             if item is not None and allowed.value_of(item) is None:
-                text = f"{key}: {item} is not {allowed.said}"
-                section.note("driver-value", key, text)
+                section.wrong("driver-value", key, f"{item} is not {allowed.said}")
     for name, slave in slaves.items():
         for channel in slave.channels:
             _check_scale(layout.slaves[name], channel, "pos")
@@ -187,11 +181,10 @@ def _check_class(section: BusFileSection) -> None:
     own = _CLASSES.get(short.removeprefix("Lifecycle"))
     if own is None:
         known = [each for name in _CLASSES for each in (name, f"Lifecycle{name}")]
-        text = f"driver: ros2_canopen has no class {shorten(short)!r}; {near(short, known)}"
-        section.note("driver-class", "driver", text)
+        text = f"ros2_canopen has no class {shorten(short)!r}; {near(short, known)}"
+        section.wrong("driver-class", "driver", text)
     elif package != own and package in _CLASSES.values():
-        text = f"package: {package} has no {short}; it is in {own}"
-        section.note("driver-class", "package", text)
+        section.wrong("driver-class", "package", f"{package} has no {short}; it is in {own}")
 
 
 def _check_scale(section: BusFileSection, channel: DriveChannel, what: str) -> None:

@@ -76,7 +76,7 @@ def _read_master(section: BusFileSection, options: BusDefaults) -> BusMaster:
     numbers = ("vendor_id", "product_code", "revision_number", "serial_number")
     node_id = whole("node_id", UNSET, 1, UNSET)
     if HIGHEST_NODE_ID < node_id < UNSET:
-        section.note("node-id", "node_id", f"node_id: {node_id} is not in 1..127")
+        section.wrong("node-id", "node_id", f"{node_id} is not in 1..127")
         node_id = UNSET
     return BusMaster(
         node_id,
@@ -106,15 +106,15 @@ def _bit_rate(section: BusFileSection) -> int:
     rate = section.whole("baudrate", 1000, 1, 1000)
     if rate not in BIT_RATES_KBIT:
         allowed = ", ".join(map(str, BIT_RATES_KBIT))
-        section.note("bit-rate", "baudrate", f"baudrate: {rate} kbit/s is not one of {allowed}")
+        section.wrong("bit-rate", "baudrate", f"{rate} kbit/s is not one of {allowed}")
     return rate
 
 
 def _sync_period(section: BusFileSection) -> int:
     period_us = section.whole("sync_period")
     if 0 < period_us < _SHORTEST_SYNC_US:
-        text = f"sync_period: a SYNC each {period_us} µs; {_SHORTEST_SYNC_US} µs is already short"
-        section.note("sync-period", "sync_period", text)
+        text = f"a SYNC each {period_us} µs; {_SHORTEST_SYNC_US} µs is already short"
+        section.wrong("sync-period", "sync_period", text)
     return period_us
 
 
@@ -145,8 +145,7 @@ def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: Bu
                 writes.insert(_CONSUMER, sub, master.node_id << 16, place)
         return
     if _CONSUMER not in sheet:
-        text = f"heartbeat_consumer: {sheet.path.name} has no 1016h"
-        node.note("no-object", "heartbeat_consumer", text)
+        node.wrong("no-object", "heartbeat_consumer", f"{sheet.path.name} has no 1016h")
         return
     own = [sub for sub, value in entries.items() if _node_id(value) == master.node_id]
     free = [sub for sub, value in entries.items() if not value & UNSIGNED16 or _is_unused(value)]
@@ -154,8 +153,8 @@ def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: Bu
         value = (master.node_id & UNSIGNED8) << 16 | time_ms & UNSIGNED16
         writes.insert(_CONSUMER, sub, value, place)
     else:
-        text = f"heartbeat_consumer: no entry of 1016h is free: {sheet.place(_CONSUMER)}"
-        node.note("no-entry", "heartbeat_consumer", text)
+        text = f"no entry of 1016h is free: {sheet.place(_CONSUMER)}"
+        node.wrong("no-entry", "heartbeat_consumer", text)
 
 
 def _node_id(value: int) -> int:

@@ -48,16 +48,15 @@ def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     names = list(_named(top))
     hidden = {key: top.place_of(key) for key in names if key.startswith(".")}
     nodes = (key for key in names if key not in {OPTIONS, MASTER, *hidden})
-    slaves = {
-        key: BusFileSection(notes, shorten(key), top.fields[key], top.place_of(key))
-        for key in nodes
-    }
-    return Layout(*ends, slaves, hidden)
+    return Layout(*ends, {key: _section(top, key) for key in nodes}, hidden)
 
 
 def _optional(top: BusFileSection, key: str) -> BusFileSection | None:
-    item = top.fields.get(key)
-    return None if item is None else BusFileSection(top.notes, key, item, top.place_of(key))
+    return _section(top, key) if key in top else None
+
+
+def _section(top: BusFileSection, key: str) -> BusFileSection:
+    return BusFileSection(top.notes, shorten(key), top.fields[key], top.place_of(key))
 
 
 def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
@@ -68,7 +67,7 @@ def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
     if _NODES not in top:
         top.note("no-nodes", _DEFAULTS, "defaults, but no nodes to apply them to")
         return {}
-    nodes = BusFileSection(top.notes, _NODES, top.fields[_NODES], top.place_of(_NODES))
+    nodes = _section(top, _NODES)
     defaults = _optional(top, _DEFAULTS)
     found = {}
     for name in sorted(_named(nodes)):
@@ -83,7 +82,7 @@ def _named(section: BusFileSection) -> Iterator[str]:
         if isinstance(key, str):
             yield key
         else:
-            section.note("kind", key, f"{shorten(str(key))}: the name of a node must be a text")
+            section.wrong("kind", key, "the name of a node must be a text")
 
 
 def _with_defaults(

@@ -98,6 +98,10 @@ class BusFileSection:
         """Record a finding about a key."""
         self.notes.note(rule, self.place_of(key), self.name, text)
 
+    def wrong(self, rule: str, key: Key, reason: str) -> None:
+        """Record a finding about a key, with the key before the reason."""
+        self.note(rule, key, f"{shorten(str(key))}: {reason}")
+
     def section(self, key: Key) -> BusFileSection:
         """Return a mapping of the section, or an empty one if the key is missing."""
         place = self.place_of(key)
@@ -110,7 +114,7 @@ class BusFileSection:
         if item is None:
             return []
         if not item.is_list:
-            self.note("kind", key, f"{shorten(str(key))}: {item} is not a list")
+            self.wrong("kind", key, f"{item} is not a list")
         name = f"{self.name}.{key}"
         return [BusFileSection(self.notes, name, each, each.place) for each in item.items]
 
@@ -123,13 +127,11 @@ class BusFileSection:
         if number is None:
             return default
         if isinstance(number, float) and not number.is_integer():
-            self.note(
-                "not-whole", key, f"{shorten(str(key))}: {item.text} is cut off: {int(number)}"
-            )
+            self.wrong("not-whole", key, f"{item.text} is cut off: {int(number)}")
         number = int(number)
         if not low <= number <= high:
             allowed = f"{low}..{high}" if high <= UNSIGNED16 else f"{low}..0x{high:X}"
-            self.note("number-range", key, f"{shorten(str(key))}: {item.text} is not in {allowed}")
+            self.wrong("number-range", key, f"{item.text} is not in {allowed}")
             return default
         return number
 
@@ -146,8 +148,7 @@ class BusFileSection:
             return default
         if not isinstance(item.value, bool | int):
             taken = str(bool(item.value)).lower()
-            text = f"{shorten(str(key))}: {item} is not true or false: {taken} is taken"
-            self.note("flag-text", key, text)
+            self.wrong("flag-text", key, f"{item} is not true or false: {taken} is taken")
         return bool(item.value)
 
     def text(self, key: Key, default: str = "") -> str:
@@ -156,7 +157,7 @@ class BusFileSection:
         if item is None:
             return default
         if item.is_list or item.is_mapping or item.value is None:
-            self.note("kind", key, f"{shorten(str(key))}: {item} is not a text")
+            self.wrong("kind", key, f"{item} is not a text")
             return default
         return item.value if isinstance(item.value, str) else item.text
 
@@ -170,9 +171,7 @@ class BusFileSection:
                 return value
         except (ValueError, OverflowError):
             pass
-        self.note(
-            "no-number", key, f"{shorten(str(key))}: {item} is not a number{_as_number(item.text)}"
-        )
+        self.wrong("no-number", key, f"{item} is not a number{_as_number(item.text)}")
         return None
 
 

@@ -132,9 +132,9 @@ class Sheets:
             path = next((path for path in looked if path.is_file()), None)
             if path is not None:
                 return self._sheet(node, path, is_first=path == looked[0])
-            node.note("no-file", "dcf", f"dcf: {self._not_found(name, looked)}")
+            node.wrong("no-file", "dcf", self._not_found(name, looked))
         except (OSError, EdsError) as error:
-            node.note("no-file", "dcf", f"dcf: {_said(name, error)}")
+            node.wrong("no-file", "dcf", _said(name, error))
         return None
 
     def _candidates(self, name: str, dcf_path: str) -> Iterator[Path]:
@@ -161,8 +161,7 @@ class Sheets:
     def _sheet(self, node: BusFileSection, path: Path, *, is_first: bool) -> Sheet | None:
         file, device = read_sheet(path)
         if not is_first:
-            text = f"dcf: using the file in {_printable(str(path.parent))}"
-            node.note("file-elsewhere", "dcf", text)
+            node.wrong("file-elsewhere", "dcf", f"using the file in {_printable(str(path.parent))}")
         for one in file.errors:
             where = f"[{shorten(one.section)}] " if one.section else ""
             place = FilePlace(str(path), one.line)
@@ -176,9 +175,9 @@ def _node_id(node: BusFileSection) -> int:
     if number == _WRONG:
         return 0
     if number != UNSET and not 1 <= number <= HIGHEST_NODE_ID:
-        node.note("node-id", "node_id", f"node_id: {number} is not in 1..127")
+        node.wrong("node-id", "node_id", f"{number} is not in 1..127")
     elif number == UNSET and "node_id" in node:
-        node.note("no-node-id", "node_id", "node_id: 255 is not a node: dcfgen leaves it out")
+        node.wrong("no-node-id", "node_id", "255 is not a node: dcfgen leaves it out")
     else:
         return number % UNSET
     return 0

@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusSlave, DriveChannel, Identity
 from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, SLAVE, check_keys
-from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, UNSIGNED32, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes
 from tickrig.host.text.document import FilePlace, Item
@@ -98,8 +98,8 @@ class SlaveReader:
             mandatory=node.flag("mandatory", default=False),
             reset_communication=node.flag("reset_communication", default=True),
             software_file=node.text("software_file"),
-            software_version=self._software_version(),
-            restore_configuration=self._restore(),
+            software_version=self._whole_of("software_version", UNSIGNED32, SOFTWARE, 1),
+            restore_configuration=self._whole_of("restore_configuration", UNSIGNED8, RESTORE),
             boot_timeout_ms=node.whole("boot_timeout_ms") if "boot_timeout_ms" in node else None,
         )
 
@@ -141,13 +141,12 @@ class SlaveReader:
         number = node.whole(key, in_eds)
         if sheet.row(IDENTITY, sub) is None:
             if number and key in node:
-                text = f"{key}: {sheet.path.name} has no 1018h:{sub:02X}, so none is checked"
-                node.note("no-object", key, text)
+                text = f"{sheet.path.name} has no 1018h:{sub:02X}, so none is checked"
+                node.wrong("no-object", key, text)
             return 0
         if in_eds and number not in {0, in_eds}:
             where = sheet.place(IDENTITY, sub)
-            text = f"{key}: 0x{number:08X}, but the EDS has 0x{in_eds:08X}: {where}"
-            node.note("identity", key, text)
+            node.wrong("identity", key, f"0x{number:08X}, but the EDS has 0x{in_eds:08X}: {where}")
         return number
 
     def _check_identity_keys(self) -> None:
@@ -174,8 +173,7 @@ class SlaveReader:
             if index in sheet:
                 self.writes.add(index, 0, number, node.place_of(key))
             else:
-                text = f"{key}: {sheet.path.name} has no {index:04X}h"
-                node.note("no-object", key, text)
+                node.wrong("no-object", key, f"{sheet.path.name} has no {index:04X}h")
         return number
 
     def _error_behavior(self) -> None:
@@ -193,19 +191,14 @@ class SlaveReader:
             elif number != self._sheet.value(ERROR_BEHAVIOR, row.sub):
                 self.writes.add(ERROR_BEHAVIOR, row.sub, number, section.place_of(sub))
 
-    def _software_version(self) -> int:
-        number = self._node.whole("software_version")
-        if "software_version" in self._node and self._sheet.row(SOFTWARE, 1) is None:
-            text = f"software_version: {self._sheet.path.name} has no 1F56h:01"
-            self._node.note("no-object", "software_version", text)
+    def _whole_of(self, key: str, most: int, index: int, sub: int | None = None) -> int:
+        """Read a number. Report that the EDS lacks its object, of which it may be the sub-index."""
+        number = self._node.whole(key, 0, 0, most)
+        sub = number if sub is None else sub
+        if key in self._node and self._sheet.row(index, sub) is None:
+            text = f"{self._sheet.path.name} has no {index:04X}h:{sub:02X}"
+            self._node.wrong("no-object", key, text)
         return number
-
-    def _restore(self) -> int:
-        sub = self._node.whole("restore_configuration", 0, 0, UNSIGNED8)
-        if "restore_configuration" in self._node and self._sheet.row(RESTORE, sub) is None:
-            text = f"restore_configuration: {self._sheet.path.name} has no 1011h:{sub:02X}"
-            self._node.note("no-object", "restore_configuration", text)
-        return sub
 
     def _sdo(self) -> None:
         for entry in self._node.sections("sdo"):
