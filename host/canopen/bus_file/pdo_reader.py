@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusPdo
 from tickrig.host.canopen.bus_file.known_keys import PDO, check_keys
@@ -28,6 +28,13 @@ _OTHER_WAY: Final = {
 
 The key is whether the PDO is a TPDO.
 """
+_PARAMETERS: Final = (
+    ("transmission", "transmission", 2, UNSIGNED8),
+    ("inhibit_time", "inhibit_time_100us", 3, UNSIGNED16),
+    ("event_timer", "event_timer_ms", 5, UNSIGNED16),
+    ("sync_start", "sync_start", 6, UNSIGNED8),
+)
+"""Keys of a PDO, each with its field, its sub-index and the highest value."""
 _FIRST_FREE: Final = 0x680
 _END_OF_FREE: Final = 0x6E0
 
@@ -133,31 +140,20 @@ class PdoReader:
 
     def _with_parameters(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
         """Read the parameters in the file. Do not write the parameters of the other direction."""
-        kind = section.whole("transmission", pdo.transmission, 0, UNSIGNED8)
-        inhibit = section.whole("inhibit_time", pdo.inhibit_time_100us, 0, UNSIGNED16)
-        timer = section.whole("event_timer", pdo.event_timer_ms, 0, UNSIGNED16)
-        sync = section.whole("sync_start", pdo.sync_start, 0, UNSIGNED8)
-        if kind != pdo.transmission:
-            self._writes.add(index, 2, kind, section.place_of("transmission"))
+        changed: dict[str, Any] = {}
+        given = [
+            section.whole(key, getattr(pdo, field), 0, most) for key, field, _, most in _PARAMETERS
+        ]
+        for (key, field, sub, _), number in zip(_PARAMETERS, given, strict=True):
+            if number != getattr(pdo, field) and key not in _OTHER_WAY[pdo.transmit]:
+                self._writes.add(index, sub, number, section.place_of(key))
+                changed[field] = number
         if not pdo.transmit:
             deadline = section.whole("event_deadline", pdo.event_timer_ms, 0, UNSIGNED16)
             if deadline != pdo.event_timer_ms:
                 text = "event_deadline of an RPDO: dcfgen fails on it"
                 section.note("event-deadline", "event_deadline", text)
-            return replace(pdo, transmission=kind)
-        if inhibit != pdo.inhibit_time_100us:
-            self._writes.add(index, 3, inhibit, section.place_of("inhibit_time"))
-        if timer != pdo.event_timer_ms:
-            self._writes.add(index, 5, timer, section.place_of("event_timer"))
-        if sync != pdo.sync_start:
-            self._writes.add(index, 6, sync, section.place_of("sync_start"))
-        return replace(
-            *(pdo,),
-            transmission=kind,
-            inhibit_time_100us=inhibit,
-            event_timer_ms=timer,
-            sync_start=sync,
-        )
+        return replace(pdo, **changed)
 
     def _with_mapping(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
         place = section.place_of("mapping")
@@ -224,25 +220,30 @@ def _said(pdos: dict[int, BusPdo]) -> str:
 
 def _of_sheet(sheet: Sheet, index: int) -> BusPdo:
     """Return a PDO with its power-on values."""
-    transmit = index >= TPDO
-    pdo = BusPdo(index - (TPDO if transmit else RPDO) + 1, transmit, INVALID)
-    count, value = sheet.value(index, 0), sheet.value
-    return replace(
-        pdo,
-        cob_id=value(index, 1, INVALID) if count >= 1 else INVALID,
-        transmission=value(index, 2) if count >= 2 else 0,
-        inhibit_time_100us=value(index, 3) if count >= 3 and transmit else 0,
-        event_timer_ms=value(index, 5) if count >= 5 else 0,
-        sync_start=value(index, 6) if count >= 6 and transmit else 0,
-        mapping=tuple(_mapping(sheet, index + _MAPPING)),
-    )
-
-
-def _mapping(sheet: Sheet, index: int) -> Iterator[MappedObject]:
     count = sheet.value(index, 0)
-    for sub in sheet.subs(index):
-        if 1 <= sub <= count and (value := sheet.value(index, sub)):
-            yield MappedObject.parse(value)
+
+    def value(at: int, sub: int, default: int = 0) -> int:
+        return default if at == index and sub > count else sheet.value(at, sub, default)
+
+    pdo = _pdo(sheet, index, value)
+    return replace(pdo, mapping=tuple(mapped for mapped in pdo.mapping if mapped.encode()))
+
+
+def _pdo(sheet: Sheet, index: int, value: Callable[..., int]) -> BusPdo:
+    """Return a PDO with the values that a function gives for an index and a sub-index."""
+    transmit, mapping = index >= TPDO, index + _MAPPING
+    count = value(mapping, 0)
+    mapped = (value(mapping, sub) for sub in sheet.subs(mapping) if 1 <= sub <= count)
+    return BusPdo(
+        index - (TPDO if transmit else RPDO) + 1,
+        transmit,
+        value(index, 1, INVALID),
+        value(index, 2),
+        inhibit_time_100us=value(index, 3) if transmit else 0,
+        event_timer_ms=value(index, 5),
+        sync_start=value(index, 6) if transmit else 0,
+        mapping=tuple(map(MappedObject.parse, mapped)),
+    )
 
 
 def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
@@ -253,20 +254,4 @@ def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
         data = written.get(index << 8 | sub)
         return sheet.value(index, sub, default) if data is None else int.from_bytes(data, "little")
 
-    def pdo(index: int, number: int, transmit: bool) -> BusPdo:
-        count = value(index + _MAPPING, 0)
-        subs = (sub for sub in sheet.subs(index + _MAPPING) if 1 <= sub <= count)
-        mapping = (MappedObject.parse(value(index + _MAPPING, sub)) for sub in subs)
-        return BusPdo(
-            *(number, transmit, value(index, 1, INVALID), value(index, 2)),
-            inhibit_time_100us=value(index, 3) if transmit else 0,
-            event_timer_ms=value(index, 5),
-            sync_start=value(index, 6) if transmit else 0,
-            mapping=tuple(mapping),
-        )
-
-    return tuple(
-        pdo(index, index - first + 1, first == TPDO)
-        for first in (RPDO, TPDO)
-        for index in sheet.pdos(first)
-    )
+    return tuple(_pdo(sheet, index, value) for first in (RPDO, TPDO) for index in sheet.pdos(first))
