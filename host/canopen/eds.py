@@ -8,6 +8,7 @@ from typing import Final
 
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding, decode_text
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 
 MOST_BYTES: Final = 32_000_000
 """The size above which a file is not an EDS."""
@@ -90,3 +91,11 @@ def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
     if not device.entries:
         raise EdsError(file.errors)
     return device, (*file.errors, *file.warnings)
+
+
+def eds_number(text: str) -> int | None:
+    """Return the number of a keyword, written in any way that an EDS has, or None if it is none."""
+    try:
+        return parse_number(plain_numbers(text))
+    except ValueError:
+        return None

@@ -9,13 +9,12 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusWrite
 from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
-from tickrig.host.canopen.eds import read_sheet
+from tickrig.host.canopen.eds import eds_number, read_sheet
 from tickrig.host.text.document import FilePlace
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import COMMISSIONING, HIGHEST_NODE_ID, EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 _FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
@@ -87,10 +86,7 @@ class Sheet:
 
     def head_number(self, section: str, key: str) -> int:
         """Return a number of the section DeviceInfo, or 0 if the keyword is missing."""
-        try:
-            return parse_number(plain_numbers(self.file.value(section, key)) or "0")
-        except ValueError:
-            return 0
+        return eds_number(self.file.value(section, key)) or 0
 
     def identity(self, key: str, sub: int) -> int:
         """Return a number of the identity. As in dcfgen, DeviceInfo takes precedence over 1018h."""

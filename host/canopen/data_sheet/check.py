@@ -41,6 +41,15 @@ _CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     ),
     *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
+_OF_TEXT: Final = frozenset(
+    (
+        *(value_rules.stray_lines, value_rules.list_numbers, truncation.truncated),
+        *(text_rules.line_ends, text_rules.titles, text_rules.keywords, text_rules.comments),
+        *(head_rules.sections, head_rules.file_info, head_rules.comment_lines),
+        *(list_rules.lists, object_rules.kinds, pdo_rules.compact),
+    )
+)
+"""Rules for the form of a text file, which an XML file does not have."""
 _UNREADABLE: Final = frozenset({"xml", "no-objects"})
 """Rules that hide missing parts. If one of them is broken, missing parts are not reported."""
 
@@ -53,7 +62,8 @@ def check(document: Document) -> list[RuleFinding]:
 
 
 def _check(document: Document) -> list[RuleFinding]:
-    found = list(dict.fromkeys(one for rule in _CHECKS for one in rule(document)))
+    rules = [rule for rule in _CHECKS if not (document.file.is_xml and rule in _OF_TEXT)]
+    found = list(dict.fromkeys(one for rule in rules for one in rule(document)))
     if document.file.is_xml and any(one.rule.name in _UNREADABLE for one in found):
         found = [one for one in found if one.rule.name in _UNREADABLE]
     return sorted(found, key=lambda one: one.line)

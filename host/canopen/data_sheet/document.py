@@ -131,7 +131,7 @@ class Document:
     def with_value(self, line: EdsLine, value: str) -> Edit:
         """Return the edit that gives a keyword another value. Blanks and comment are kept."""
         text = self.texts[line.number - 1]
-        begin = text.index("=") + 1
+        begin = text.find("=") + 1
         at = text.index(line.value, begin) if line.value in text[begin:] else begin
         return Edit(line.number, lines=(text[:at] + value + text[at + len(line.value) :],))
 

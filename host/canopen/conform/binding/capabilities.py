@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
 from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
+from tickrig.host.canopen.eds import eds_number
 from tickrig.host.canopen.errors import SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo import Abort
 
@@ -82,11 +81,11 @@ class EdsClaims(NamedTuple):
     def of_file(cls, file: EdsFile) -> EdsClaims:
         """Read the claims of an EDS."""
         info, dummies = (file.sections.get(name, {}) for name in ("DeviceInfo", "DummyUsage"))
-        numbers = {sub: _number(info.get(key.lower(), "")) for sub, key in _IDENTITY}
+        numbers = {sub: eds_number(info.get(key.lower(), "")) for sub, key in _IDENTITY}
         return cls(
-            bool(_number(info.get("lss_supported", ""))),
+            bool(eds_number(info.get("lss_supported", ""))),
             frozenset(
-                word for word, key in _DUMMIES.items() if _number(dummies.get(key.lower(), ""))
+                word for word, key in _DUMMIES.items() if eds_number(dummies.get(key.lower(), ""))
             ),
             {sub: number for sub, number in numbers.items() if number is not None},
         )
@@ -228,13 +227,6 @@ def _unsaid(claims: EdsClaims | None, key: str, what: str) -> str:
     if claims is None:
         return f"without an EDS it is unknown whether {what}"
     return f"{key} of the EDS does not say that {what}"
-
-
-def _number(text: str) -> int | None:
-    """Read a number of an EDS. Return None if the text is not a number."""
-    with suppress(ValueError):
-        return parse_number(plain_numbers(text))
-    return None
 
 
 def _has_lss_address(binding: Binding) -> bool:

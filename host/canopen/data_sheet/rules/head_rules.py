@@ -11,6 +11,7 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules import known_keys
 from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
+from tickrig.host.canopen.eds import eds_number
 from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.eds_file import shorten
 
@@ -37,17 +38,14 @@ _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber"
 
 def number(document: Document, section: str, key: str) -> int | None:
     """Return the number of a keyword, or None if it is not a 32-bit number."""
-    try:
-        found = eds_value.parse_number(eds_value.plain_numbers(document.file.value(section, key)))
-    except ValueError:
-        return None
-    return found if found.bit_length() <= _WIDEST else None
+    found = eds_number(document.file.value(section, key))
+    return None if found is None or found.bit_length() > _WIDEST else found
 
 
 def sections(document: Document) -> Iterator[RuleFinding]:
     """Find missing sections that every tool needs."""
     for title in _NEEDED:
-        if title not in document.file.sections and not document.file.is_xml:
+        if title not in document.file.sections:
             last = len(document.texts)
             first = (
                 "SupportedObjects=0" if title == "MandatoryObjects" else f"{known_keys.NAMES[0]}="
@@ -59,8 +57,6 @@ def sections(document: Document) -> Iterator[RuleFinding]:
 
 def file_info(document: Document) -> Iterator[RuleFinding]:
     """Check [FileInfo]."""
-    if document.file.is_xml:
-        return
     file = document.file
     for key in known_keys.FILE_INFO:
         if not file.has("FileInfo", key):
@@ -92,8 +88,8 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
     for key in (*known_keys.NUMBERS, *known_keys.FLAGS):
         line = document.keyword(title, key)
         if line is not None and not line.value:
-            edits = () if file.is_xml else (document.with_value(line, "0"),)
-            yield document.found("empty-value", f"{key} is empty: 0 is taken", title, key, *edits)
+            edit, what = document.with_value(line, "0"), f"{key} is empty: 0 is taken"
+            yield document.found("empty-value", what, title, key, edit)
     for key in known_keys.FLAGS:
         if number(document, title, key) not in (None, 0, 1):
             what = f"{key}={shorten(file.value(title, key))} is not 0 or 1"
@@ -124,8 +120,7 @@ def counts(document: Document) -> Iterator[RuleFinding]:
             be = "is" if present == 1 else "are"
             what = f"{key}={said}, but of {area[0]:X}h to {area[-1]:X}h there {be} {present}"
             whole = present and are_whole(document)  # otherwise some may be lost
-            sound = not document.file.is_xml and (said < present or whole)
-            edits = (document.with_value(line, str(present)),) if sound else ()
+            edits = (document.with_value(line, str(present)),) if said < present or whole else ()
             yield document.found("pdo-count", what, title, key, *edits)
     for key, sub in _IDENTITY:
         row, said = document.rows.get((_IDENTITY_OBJECT, sub)), number(document, title, key)
@@ -175,7 +170,7 @@ def comment_lines(document: Document) -> Iterator[RuleFinding]:
     lines = document.lines_of("Comments")
     numbers = {line.key.lower() for line in lines if line.key.lower() != "lines"}
     head = document.keyword("Comments", "Lines")
-    if head is None or document.file.is_xml:
+    if head is None:
         return
     said = number(document, "Comments", "Lines")
     wanted = {f"line{at}" for at in range(1, len(numbers) + 1)}

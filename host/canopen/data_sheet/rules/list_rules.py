@@ -12,8 +12,9 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
+from tickrig.host.canopen.eds import eds_number
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_value import EdsLine, parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import EdsLine
 
 _MANDATORY: Final = "MandatoryObjects"
 _OPTIONAL: Final = "OptionalObjects"
@@ -48,11 +49,8 @@ class ObjectList:
 
 
 def _index(text: str) -> int | None:
-    try:
-        number = parse_number(plain_numbers(text))
-    except ValueError:
-        return None
-    return number if 0 <= number <= 0xFFFF else None
+    number = eds_number(text)
+    return number if number in range(0x1_0000) else None
 
 
 def _home(index: int) -> str:
@@ -85,8 +83,6 @@ def are_whole(document: Document) -> bool:
 
 def lists(document: Document) -> Iterator[RuleFinding]:
     """Check the three lists. Each finding fixes a whole list."""
-    if document.file.is_xml:
-        return
     found = [ObjectList(document, title) for title in LISTS]
     present = described(document)
     listed = {index for each in found for index in each.indices}

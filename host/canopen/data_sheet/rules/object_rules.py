@@ -39,7 +39,7 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)
-        if described is None or file.is_xml:
+        if described is None:
             continue
         composed = sub is None and described.code not in VARIABLES
         if composed and not file.has(section, "ObjectType"):
@@ -71,7 +71,7 @@ def sub_numbers(document: Document) -> Iterator[RuleFinding]:
         elif line is not None and said not in (present, None):
             what = f"SubNumber={said}, but there are {present} sub-indices"
             lost = said > present and not _is_whole(document, section, index)
-            edits = () if file.is_xml or lost else (document.with_value(line, str(present)),)
+            edits = () if lost else (document.with_value(line, str(present)),)
             yield document.found("sub-number", what, section, "SubNumber", *edits)
 
 
@@ -109,7 +109,7 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
         return
     what = f"its default is {said}, the highest sub-index is {max(subs)}"
     edits: tuple[Edit, ...] = ()
-    if line is not None and said < max(subs) and not document.file.is_xml:
+    if line is not None and said < max(subs):
         edits = (document.with_value(line, str(max(subs))),)
     yield document.found("sub0-value", what, section, "DefaultValue", *edits)
 
@@ -125,7 +125,7 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     """Return the edits that write each entry of a compact object as its own section."""
     place = object_section(section)
     known = all(document.file.value(section, key) for key in ("DataType", "AccessType"))
-    if place is None or document.file.is_xml or not known:
+    if place is None or not known:
         return ()
     index, _ = place
     rows = document.entries(index)

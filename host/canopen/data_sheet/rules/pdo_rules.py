@@ -12,22 +12,17 @@ from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import ELEMENTS, WAYS
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.nmt import EXTENDED, INVALID, is_restricted
 
 _RPDO: Final = range(0x1400, 0x1600)
 _TPDO: Final = range(0x1800, 0x1A00)
 _MAPPING: Final = 0x200
-_INVALID: Final = 1 << 31
-_EXTENDED: Final = 1 << 29
 _IDS: Final = 0x7FF
 _UPPER_BITS: Final = 0x1FFF_F800
 _MOST_BITS: Final = 64
 _MOST_MAPPED: Final = 64
 _LOWEST_NODE: Final = 1
 _HIGHEST_NODE: Final = 127
-_RESTRICTED: Final = (
-    *(range(0x080), range(0x101, 0x181), range(0x581, 0x600), range(0x601, 0x680)),
-    *(range(0x6E0, 0x700), range(0x701, 0x800)),
-)
 _SYNC: Final = 0x1005
 _EMCY: Final = 0x1014
 _SDO: Final = range(0x1200, 0x1300)
@@ -68,7 +63,7 @@ def _cob_id(
     values = [
         int.from_bytes(row.power_on_data(node), "little") for node in (_LOWEST_NODE, _HIGHEST_NODE)
     ]
-    if values[0] & (_EXTENDED | (0 if row.index == _SYNC else _INVALID)):
+    if values[0] & (EXTENDED | (0 if row.index == _SYNC else INVALID)):
         return
     if values[1] & _UPPER_BITS:
         what = f"0x{values[1]:08X} of node {_HIGHEST_NODE} has no CAN-ID of 11 bits"
@@ -80,7 +75,7 @@ def _cob_id(
         said = shorten(document.file.value(place, "DefaultValue"))
         what = f"DefaultValue={said} is not $NODEID+0x{base:X}"
         yield document.found("sdo-server", what, place, "DefaultValue")
-    elif base is None and any(can_id in area for can_id in ids for area in _RESTRICTED):
+    elif base is None and any(map(is_restricted, ids)):
         what = f"CAN-ID 0x{ids[0]:03X} to 0x{ids[1]:03X} of nodes 1 to 127 is restricted"
         yield document.found("cob-id-restricted", what, place, "DefaultValue")
         return
@@ -107,7 +102,7 @@ def compact(document: Document) -> Iterator[RuleFinding]:
     """Check the objects that CompactPDO implies."""
     title, key = "DeviceInfo", "CompactPDO"
     mask = number(document, title, key)
-    if not mask or document.file.is_xml:
+    if not mask:
         return
     if mask & ~_ALL_SUBS:
         what = f"CompactPDO=0x{mask:X} has bits beyond 0x{_ALL_SUBS:X}"

@@ -48,8 +48,6 @@ def encoding(document: Document) -> Iterator[RuleFinding]:
 def line_ends(document: Document) -> Iterator[RuleFinding]:
     """Find lines that end with CR alone, and files with mixed line ends."""
     ends = set(document.ends) - {""}
-    if document.file.is_xml:
-        return
     if "\r" in ends:
         first = document.ends.index("\r") + 1
         edit = Edit(0, EditPlace.LINE_ENDS)
@@ -62,7 +60,7 @@ def line_ends(document: Document) -> Iterator[RuleFinding]:
 def titles(document: Document) -> Iterator[RuleFinding]:
     """Find section titles that CiA 306 spells differently, and unknown sections."""
     for line in document.file.lines:
-        if not line.title or document.file.is_xml:
+        if not line.title:
             continue
         if line.section in KNOWN_SECTIONS.values() or SECTION.fullmatch(line.section):
             yield from _title(document, line)
@@ -84,8 +82,6 @@ def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
 
 def keywords(document: Document) -> Iterator[RuleFinding]:
     """Find unknown keywords, and keywords that CiA 306 spells differently."""
-    if document.file.is_xml:
-        return
     for line in document.file.lines:
         known = keys_of(line.section)
         if not line.is_keyword or not line.key or known is None:
@@ -103,7 +99,7 @@ def keywords(document: Document) -> Iterator[RuleFinding]:
 
 def comments(document: Document) -> Iterator[RuleFinding]:
     """Find comments that some readers do not recognise as comments."""
-    for line in () if document.file.is_xml else document.file.lines:
+    for line in document.file.lines:
         text = line.text.strip()
         raw = document.texts[line.number - 1]
         if text.startswith("#"):

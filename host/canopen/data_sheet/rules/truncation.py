@@ -22,7 +22,7 @@ A single sign may be a slip, such as one missing object.
 def truncated(document: Document) -> Iterator[RuleFinding]:
     """Find a file that ends before everything that the file announces."""
     lines = [line for line in document.file.lines if line.content]
-    if document.file.is_xml or not lines:
+    if not lines:
         return
     last = lines[-1].section
     lost = _listed_behind(document, last)

@@ -8,7 +8,7 @@ from itertools import takewhile
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import RULES, Edit, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.known_keys import is_number
 from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
@@ -51,7 +51,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
 
 def list_numbers(document: Document) -> Iterator[RuleFinding]:
     """Find numbered keywords with leading zeros, which other readers do not find."""
-    for line in () if document.file.is_xml else document.file.lines:
+    for line in document.file.lines:
         zeros = _NUMBERED.fullmatch(line.key) if line.is_keyword else None
         if zeros is None or eds_value.object_section(line.section) is not None:
             continue
@@ -85,7 +85,7 @@ def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str])
     if len(terms) > 1:
         what = f"{shorten(line.content)}: {what.partition(' is ')[2]}"
     edits: tuple[Edit, ...] = ()
-    if all(int(term, 8) == int(term) for term in octal) and not document.file.is_xml:
+    if all(int(term, 8) == int(term) for term in octal):
         plain = "+".join(str(int(term)) if term in octal else term for term in terms)
         said = eds_value.without_comment(line.value)
         edits = (document.with_value(line, line.value.replace(said, plain, 1)),)
@@ -175,8 +175,7 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
             text = _doubled_text(document, line)
         elif finding.rule in _OF_ONE_ENTRY and _is_compact_record(document, finding.section):
             text += "; rather than adding it, describe each entry of the RECORD"
-        where = shorten(finding.section)
-        yield RuleFinding(RULES[finding.rule], document.name, finding.line, where, text, edits)
+        yield document.found(finding.rule, text, finding.section, finding.line, *edits)
 
 
 def _is_compact_record(document: Document, section: str) -> bool:
@@ -339,7 +338,7 @@ _OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 def stray_lines(document: Document) -> Iterator[RuleFinding]:
     """Find lines without a meaning, and duplicates, in places that the reader skips."""
     seen: set[tuple[str, str]] = set()
-    for line in () if document.file.is_xml else document.file.lines:
+    for line in document.file.lines:
         if line.title:
             again = (line.section, "") in seen and not eds_value.describes_device(line.section)
             seen.add((line.section, ""))
