@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, refused_at
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
 # OpenRTM options of a command line: addresses and names of components.
@@ -68,19 +68,6 @@ class OpenRtmOptions:
     names: str = FORMAT
 
 
-def _parse_openrtm(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
-    """Read the words of a command line. The word of an omitted option is empty.
-
-    Raises:
-        ValueError: a word is invalid. The message starts with the name of its option.
-    """
-    return OpenRtmOptions(
-        _parse_endpoint("--openrtm", name_server, _PORT),
-        _parse_endpoint("--openrtm-address", address, 0) if address else Endpoint(),
-        _parse_format("--openrtm-names", names) if names else FORMAT,
-    )
-
-
 def format_name(pattern: str, values: Mapping[str, str]) -> str:
     """Make the name-server path of a component from a format of OpenRTM's `naming.formats`.
 
@@ -113,22 +100,20 @@ def parse_endpoint(text: str, port: int = _PORT) -> Endpoint:
     return Endpoint(match[1] or match[2], int(match[3] or port))
 
 
-def _parse_endpoint(option: str, text: str, port: int) -> Endpoint:
-    try:
+def _take_endpoint(option: str, text: str, port: int = _PORT) -> Endpoint:
+    with refused_at(option):
         return parse_endpoint(text, port)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
-def _parse_format(option: str, pattern: str) -> str:
+def _take_format(option: str, pattern: str) -> str:
     """Accept a format that gives each component a different path."""
     try:
         parts = format_name(pattern, dict.fromkeys(_LETTERS, "x")).split("/")
     except KeyError as error:
         known = " ".join(f"%{letter}" for letter in _LETTERS)
-        raise ValueError(f"{option}: %{error.args[0]} is not one of {known}") from None
+        raise Refused(f"{option}: %{error.args[0]} is not one of {known}") from None
     if "%n" not in pattern or not all(parts):
-        raise ValueError(f"{option}: {pattern!r} is not like {FORMAT}, with %n")
+        raise Refused(f"{option}: {pattern!r} is not like {FORMAT}, with %n")
     return pattern
 
 
@@ -197,31 +182,34 @@ def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
 
 def _take_openrtm(options: dict[str, Any]) -> OpenRtmOptions | None:
     server = options.pop("openrtm")
-    address, names = (options.pop(f"openrtm_{name}") or "" for name in ("address", "names"))
+    given = {name: options.pop(f"openrtm_{name}") or None for name in ("address", "names")}
     if server is None:
-        for option, word in (("address", address), ("names", names)):
-            if word:
-                raise Refused(f"--openrtm-{option} is for --openrtm")
+        _refuse_without("openrtm", given)
         return None
-
-    try:
-        return _parse_openrtm(server, address, names)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    address, names = given.values()
+    return OpenRtmOptions(
+        _take_endpoint("--openrtm", server),
+        _take_endpoint("--openrtm-address", address, 0) if address else Endpoint(),
+        _take_format("--openrtm-names", names) if names else FORMAT,
+    )
 
 
 def _take_ros2(options: dict[str, Any], topics: str) -> Ros2Options | None:
     wanted = options.pop("ros2", False)
     given = {name: options.pop(f"ros2_{name}", None) for name in ("domain", "interface", "table")}
     if not wanted:
-        for name, word in given.items():
-            if word is not None:
-                raise Refused(f"--ros2-{name} is for --ros2")
+        _refuse_without("ros2", given)
         return None
-    try:
-        return _parse_ros2(**given, topics=topics)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    domain, interface, table = given.values()
+    domain = _usual_domain() if domain is None else domain
+    return Ros2Options(domain, interface or "", table, topics)
+
+
+def _refuse_without(engine: str, given: Mapping[str, object]) -> None:
+    """Refuse options of an engine that is not requested."""
+    for name, word in given.items():
+        if word is not None:
+            raise Refused(f"--{engine}-{name} is for --{engine}")
 
 
 # ROS 2 options of a command line.
@@ -249,17 +237,9 @@ class Ros2Options:
     topics: str = ""
 
 
-def _parse_ros2(
-    domain: int | None, interface: str | None, table: Path | None, topics: str
-) -> Ros2Options:
-    """Return the options. The default domain is ROS_DOMAIN_ID, or 0.
-
-    Raises:
-        ValueError: the variable is not a domain.
-    """
-    if domain is None:
-        text = os.environ.get(_DOMAIN_VARIABLE, "") or "0"
-        if not re.fullmatch(r"\d{1,3}", text, re.ASCII) or int(text) > _LAST_DOMAIN:
-            raise ValueError(f"{_DOMAIN_VARIABLE} {text!r} is no domain 0..{_LAST_DOMAIN}")
-        domain = int(text)
-    return Ros2Options(domain, interface or "", table, topics)
+def _usual_domain() -> int:
+    """Return ROS_DOMAIN_ID, or 0."""
+    text = os.environ.get(_DOMAIN_VARIABLE, "") or "0"
+    if not re.fullmatch(r"\d{1,3}", text, re.ASCII) or int(text) > _LAST_DOMAIN:
+        raise Refused(f"{_DOMAIN_VARIABLE} {text!r} is no domain 0..{_LAST_DOMAIN}")
+    return int(text)

@@ -37,7 +37,7 @@ class StepPlayer:
     """
 
     def __init__(
-        self, exchange: BusExchange, node_id: int, stimulus: check.Stimulus | None, client: Client
+        self, exchange: BusExchange, node_id: int, stimulus: check.Stimulus | None, client: _Client
     ) -> None:
         self._exchange, self._stimulus, self._client = exchange, stimulus, client
         self._sdo = SdoFrames(exchange, node_id)
@@ -140,7 +140,7 @@ def _value(text: str) -> float | str:
 # The steps that only object checks have: read a value, and write it back with a wrong size.
 
 
-class Client(Protocol):
+class _Client(Protocol):
     """A client that reads and writes objects of the node under test."""
 
     def upload(self, index: int, sub: int, /) -> bytes:
@@ -151,7 +151,7 @@ class Client(Protocol):
         """Write an object. The errors are SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
-def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> None:
+def play_of_object(client: _Client, action: check.Hold | check.RefuseRewrite) -> None:
     """Do a step of an object check.
 
     Raises:
@@ -166,7 +166,7 @@ def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> 
         raise StepFailed(str(error)) from error
 
 
-def _play_hold(client: Client, step: check.Hold) -> None:
+def _play_hold(client: _Client, step: check.Hold) -> None:
     try:
         data = client.upload(*step.address)
     except SdoAborted as error:
@@ -191,7 +191,7 @@ def _check_limits(kind: DataType, data: bytes, step: check.Hold) -> None:
         raise StepFailed(f"{value} is above its upper limit {step.high}")
 
 
-def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
+def _rewrite(client: _Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
     wanted = f"abort {codes_text(codes)}"
     try:
         data = client.upload(index, sub)
