@@ -77,20 +77,6 @@ def anything(value: Any) -> Any:
     return value
 
 
-def text(value: object) -> str:
-    """Accept a text that is not empty."""
-    if isinstance(value, str) and value:
-        return value
-    raise ValueError(f"it takes a text, not {shown(value)}")
-
-
-def string(value: object) -> str:
-    """Accept a text, which may be empty."""
-    if isinstance(value, str):
-        return value
-    raise ValueError(f"it takes a text, not {shown(value)}")
-
-
 def matching(accepts: Callable[[str], object], what: str) -> _Taker:
     """Return a function that accepts a text if `accepts` does. `what` describes the valid texts."""
 
@@ -100,6 +86,16 @@ def matching(accepts: Callable[[str], object], what: str) -> _Taker:
         raise ValueError(f"it takes {what}, not {shown(value)}")
 
     return take
+
+
+text: Final = matching(bool, "a text")
+"""Accept a text that is not empty."""
+
+string: Final = matching(lambda _: True, "a text")
+"""Accept a text, which may be empty."""
+
+path: Final = matching(lambda name: name and "\0" not in name, "the name of a file")
+"""Accept the name of a file."""
 
 
 def texts(value: object) -> tuple[str, ...]:
@@ -121,13 +117,6 @@ def command(value: object) -> tuple[str, ...]:
         if isinstance(value, str) and value:
             raise ValueError(f"{shown(value)}: {str(error).lower()}") from None
     raise ValueError(f"it takes a command line, not {shown(value)}")
-
-
-def path(value: object) -> str:
-    """Accept the name of a file."""
-    if isinstance(value, str) and value and "\0" not in value:
-        return value
-    raise ValueError(f"it takes the name of a file, not {shown(value)}")
 
 
 def flag(value: object) -> bool:
