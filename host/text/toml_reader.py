@@ -120,9 +120,7 @@ class _Table:
 
     def open(self, line: int, key: str) -> _Table:
         """Open the table of a header `[key]`. Raise _TakenError if the key is already in use."""
-        node = self.entries.setdefault(key, _Table(line))
-        if not isinstance(node, _Table) or node.closed or node.frozen:
-            raise _TakenError(key, node.line)
+        node = self.dotted(line, key)
         node.line, node.closed = line, True
         return node
 

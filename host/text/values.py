@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from csv import reader
 from math import isfinite
 from typing import Final
@@ -122,23 +123,12 @@ def parse_setting(word: str) -> Setting:
     >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
     [5, -31, 0.001, 'ready', 'nan']
     """
-    for kind in (_parse_whole, _parse_fraction):
-        try:
-            return kind(word)
-        except ValueError:
-            continue
+    with suppress(ValueError):
+        return int(word, 0)
+    with suppress(ValueError):
+        if isfinite(value := float(word)):
+            return value
     return word
-
-
-def _parse_whole(word: str) -> int:
-    return int(word, 0)
-
-
-def _parse_fraction(word: str) -> float:
-    value = float(word)
-    if not isfinite(value):
-        raise ValueError
-    return value
 
 
 # Comma-separated lists of command lines.
