@@ -183,17 +183,14 @@ class BootTalk:
 
     def attempt(self, index: int, sub: int, what: str, tries: int) -> Script[bytes | SdoFailed]:
         """Read an object, with one repetition after a time-out. Return the last error."""
-        for _ in range(tries - 1):
+        while True:
+            tries -= 1
             try:
                 return (yield from upload(index, sub))
-            except SdoTimeout:
-                self.record(what, "no answer", "asked again")
             except SdoFailed as error:
-                return error
-        try:
-            return (yield from upload(index, sub))
-        except SdoFailed as error:
-            return error
+                if not tries or not isinstance(error, SdoTimeout):
+                    return error
+            self.record(what, "no answer", "asked again")
 
     def write(
         self,

@@ -151,7 +151,7 @@ class NmtMaster:
         self._heartbeat.start(self.now_us)
         self._sync.start(self.now_us)
         self._reset_slaves()
-        for slave in self._slaves():
+        for slave in self.slaves.values():
             slave.forget()
             if slave.assignment.mandatory or not slave.assignment.reset_communication:
                 slave.boot(self.now_us)
@@ -195,7 +195,7 @@ class NmtMaster:
 
     def _go_on(self) -> None:
         """Enter Operational when the master waits for no more mandatory slaves."""
-        waits = any(slave.booting and slave.assignment.mandatory for slave in self._slaves())
+        waits = any(slave.booting and slave.assignment.mandatory for slave in self.slaves.values())
         if self.halted or waits or self.state is not nmt.NmtState.PRE_OPERATIONAL:
             return
         if self.plan.starts:
@@ -205,7 +205,7 @@ class NmtMaster:
 
     def _start_all(self) -> None:
         """Start all slaves at once if none must be booted, else each booted slave, as Lely does."""
-        slaves = self._slaves()
+        slaves = self.slaves.values()
         if all(slave.good and not slave.assignment.boots for slave in slaves):
             self.command(nmt.NmtCommand.START)
             return
@@ -249,6 +249,3 @@ class NmtMaster:
             return b""
         self._sync_count = self._sync_count % self.plan.sync_overflow + 1
         return bytes((self._sync_count,))
-
-    def _slaves(self) -> tuple[NetworkSlave, ...]:
-        return tuple(self.slaves.values())

@@ -112,26 +112,20 @@ async def home(
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
     """
-    try:
-        await _home(name, mode, within_us, caught_up)
-    finally:
-        mode.runs = False
-
-
-async def _home(
-    name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
-) -> None:
     await _await(name, mode, _ERROR | _REACHED, 0, _START_US, "is not at rest")
     mode.runs = True
-    every = _ERROR | _ATTAINED | _REACHED
-    if mode.status & _ATTAINED:  # set by the previous homing: the bit may fall and rise unseen
-        await caught_up()
-        with suppress(DriveFailed):
-            await Until(lambda: not mode.status & _ATTAINED, _SEEN_US, "")
-    else:
-        await _await(name, mode, every, _REACHED, _START_US, "did not start")
-    await _await(name, mode, _ERROR | _ATTAINED, 0, within_us, "did not find home")
-    await _await(name, mode, _ERROR | _REACHED, 0, within_us, "did not come to rest")
+    try:
+        if mode.status & _ATTAINED:  # set by the previous homing: the bit may fall and rise unseen
+            await caught_up()
+            with suppress(DriveFailed):
+                await Until(lambda: not mode.status & _ATTAINED, _SEEN_US, "")
+        else:
+            every = _ERROR | _ATTAINED | _REACHED
+            await _await(name, mode, every, _REACHED, _START_US, "did not start")
+        await _await(name, mode, _ERROR | _ATTAINED, 0, within_us, "did not find home")
+        await _await(name, mode, _ERROR | _REACHED, 0, within_us, "did not come to rest")
+    finally:
+        mode.runs = False
 
 
 async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
