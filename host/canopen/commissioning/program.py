@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NoReturn, TypeVar
 
@@ -249,13 +250,10 @@ class Program:
     def _is_there(self) -> bool:
         """Return whether the node answers any request. Up to two frames may be lost."""
         for _ in range(_LOOKS):
-            try:
-                self._read(boot_slave.CONTROL)
-            except SdoTimeout:
-                continue
-            except SdoAborted:
+            with suppress(SdoTimeout):
+                with suppress(SdoAborted):
+                    self._read(boot_slave.CONTROL)
                 return True
-            return True
         return False
 
     def _transfer(self, data: bytes, on_progress: _OnProgress) -> None:
