@@ -201,25 +201,9 @@ class RefuseRewrite(OfObject):
     codes: tuple[str, ...]
 
 
-Action = (
-    Send
-    | Expect
-    | ExpectNone
-    | Count
-    | Period
-    | Wait
-    | Forget
-    | Act
-    | Macro
-    | Write
-    | RefuseWrite
-    | Read
-    | ReadOther
-    | RefuseRead
-    | Keep
-    | Hold
-    | RefuseRewrite
-)
+_OfFrames = Send | Expect | ExpectNone | Count | Period | Wait | Forget | Act | Macro
+_OfAnObject = Write | RefuseWrite | Read | ReadOther | RefuseRead | Keep | Hold | RefuseRewrite
+Action = _OfFrames | _OfAnObject
 
 
 class Step(NamedTuple):
