@@ -94,6 +94,11 @@ class Document:
         """Return the entries of an object by sub-index; empty if the object does not exist."""
         return self._entries.get(index, [])
 
+    def section_of(self, row: EntryDescription) -> str:
+        """Return the section of an entry, which is that of its object if it has none of its own."""
+        section = f"{row.index:04X}sub{row.sub:X}"
+        return section if section in self.file.sections else f"{row.index:04X}"
+
     def found(
         self, rule: str, text: str, section: str = "", line: int | str = "", *edits: Edit
     ) -> RuleFinding:

@@ -93,15 +93,10 @@ def lists(document: Document) -> Iterator[RuleFinding]:
         yield document.found("list-missing", what, f"{index:04X}", "", *edits)
     seen: set[int] = set()
     for each in found:
-        yield from _judge(document, each, found, present, seen)
-
-
-def _judge(
-    document: Document, each: ObjectList, found: list[ObjectList], present: set[int], seen: set[int]
-) -> Iterator[RuleFinding]:
-    edits = _mended(document, found, each.title, present)
-    for rule, what, line in _faults(document, each, present, seen):
-        yield document.found(rule, what, each.title, line, *(edits if rule != "list-extra" else ()))
+        edits = _mended(document, found, each.title, present)
+        for rule, what, line in _faults(document, each, present, seen):
+            mends = edits if rule != "list-extra" else ()
+            yield document.found(rule, what, each.title, line, *mends)
 
 
 def _faults(

@@ -59,7 +59,7 @@ def _is_cob_id(row: EntryDescription) -> bool:
 def _cob_id(
     document: Document, row: EntryDescription, taken: dict[int, str]
 ) -> Iterator[RuleFinding]:
-    place = _section(document, row)
+    place = document.section_of(row)
     values = [
         int.from_bytes(row.power_on_data(node), "little") for node in (_LOWEST_NODE, _HIGHEST_NODE)
     ]
@@ -182,7 +182,7 @@ def _mapped(
 ) -> Iterator[RuleFinding]:
     """Check one mapped object."""
     index, sub, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
-    place, what = _section(document, row), f"{index:04X}h:{sub:02X}"
+    place, what = document.section_of(row), f"{index:04X}h:{sub:02X}"
     if index < 0x20:  # a dummy
         return
     target = document.rows.get((index, sub))
@@ -199,9 +199,3 @@ def _mapped(
         name = "an RPDO" if way is Access.RPDO else "a TPDO"
         text = f"{what} is mapped into {name}, which its AccessType does not allow"
         yield document.found("mapped-direction", text, place, "DefaultValue")
-
-
-def _section(document: Document, row: EntryDescription) -> str:
-    """Return the section that describes an entry."""
-    section = f"{row.index:04X}sub{row.sub:X}"
-    return section if section in document.file.sections else f"{row.index:04X}"

@@ -76,9 +76,7 @@ def communication(document: Document) -> Iterator[RuleFinding]:
 def _entry(
     document: Document, row: EntryDescription, standard: StandardObject | None
 ) -> Iterator[RuleFinding]:
-    place = f"{row.index:04X}sub{row.sub:X}"
-    if place not in document.file.sections:
-        place = f"{row.index:04X}"
+    place = document.section_of(row)
     if standard is not None and (row.sub == 0 or standard.composed):
         wanted = standard.types.get(row.sub, standard.others)
         both_texts = wanted in _TEXTS and row.data_type in _TEXTS
