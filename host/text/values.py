@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from csv import reader
-from math import isfinite
+from math import inf, isfinite
 from typing import Final
 
 _TIME: Final = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(s|ms|us)?")
@@ -111,6 +112,22 @@ def counted(number: int, noun: str) -> str:
     ('1 test', '2 tests')
     """
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def aligned(rows: Iterable[Sequence[str]], left: float = inf) -> list[str]:
+    """Return rows as lines whose columns are as wide as their content.
+
+    Args:
+        rows: cells of each row.
+        left: number of columns that are aligned to the left. The others are aligned to the right.
+
+    >>> aligned([("a", "bc"), ("def", "g")]), aligned([("a", "bc"), ("def", "g")], left=1)
+    (['a    bc', 'def  g'], ['a    bc', 'def   g'])
+    """
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    forms = [f"{'<' if place < left else '>'}{width}" for place, width in enumerate(widths)]
+    return ["  ".join(map(format, row, forms)).rstrip() for row in rows]
 
 
 Setting = int | float | str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +27,7 @@ from tickrig.emulators.testing.rig_file.plan import RigFileError, RigPlan, bus_t
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import aligned
 
 _ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
 _NOWHERE: Final = "-"
@@ -234,7 +235,7 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
         bench.stop()
 
     def _greet(self, bench: RunningEmulator) -> None:
-        for line in _columns(self._row(mount) for mount in self._mounts):
+        for line in aligned(self._row(mount) for mount in self._mounts):
             click.echo(line)
         say(f"{self._plan.path} in real time. Ctrl-C ends.")
         self._say_how("Add --control PATH to press buttons and make faults.")
@@ -262,18 +263,6 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
         return " ".join(
             str(pty or port.path) if isinstance(port, PtyPort) else str(port.url) for port in ports
         )
-
-
-def _columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield rows as text with aligned columns.
-
-    >>> list(_columns([("a", "bc"), ("def", "g")]))
-    ['a    bc', 'def  g']
-    """
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
 def _setting_shown(mount: LineMount) -> Callable[[str], None]:

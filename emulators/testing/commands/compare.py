@@ -32,7 +32,7 @@ from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import counted, format_time, parse_setting
+from tickrig.host.text.values import aligned, counted, format_time, parse_setting
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.instant import NEVER
 
@@ -356,7 +356,7 @@ def report(
     sections = (
         list(_first(file, *different[0])) if different else [],
         [_row(name, pair) for name, pair in listed] + [f"... and {left} more"] * bool(left),
-        list(_table(pairs)),
+        _table(pairs),
         [f"{result} {counted(count, 'line')}, within {tolerance_us / 1_000:g} ms"],
     )
     lines = [line for section in sections if section for line in ("", *section)]
@@ -385,17 +385,14 @@ def _row(name: str, pair: Pair) -> str:
     return f"{sign} {format_time(max(0, pair.at_us))} {late} ms  {name} {text}{missing}"
 
 
-def _table(pairs: Mapping[str, Sequence[Pair]]) -> Iterator[str]:
+def _table(pairs: Mapping[str, Sequence[Pair]]) -> list[str]:
     rows = [_HEAD]
     for name, said in pairs.items():
         kinds: dict[str, list[Pair]] = {}
         for pair in said:
             kinds.setdefault(pair.kind, []).append(pair)
         rows += [_counts(f"{name} {kind}".strip(), kinds[kind]) for kind in sorted(kinds)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
-    for first, *numbers in rows:
-        cells = (f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:], strict=True))
-        yield f"{first:<{widths[0]}}  {'  '.join(cells)}".rstrip()
+    return aligned(rows, left=1)
 
 
 def _counts(name: str, pairs: Sequence[Pair]) -> tuple[str, str, str, str, str]:

@@ -28,6 +28,7 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
 from tickrig.host.cli.options import Choice
 from tickrig.host.text.page_text import json_text
+from tickrig.host.text.values import aligned
 from tickrig.wire.can import EXTENDED_MAX
 
 # Statistics of a whole log, by buses, identifiers or nodes: as text and as lines of JSON.
@@ -99,14 +100,15 @@ def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
 def by_id(snapshot: TrafficSnapshot) -> list[str]:
     """Return the table of identifiers."""
     bits = {bus.channel: bus.load.bits for bus in snapshot.buses}
-    return _aligned(_ID_HEAD, [_id_cells(row, bits[row.channel]) for row in snapshot.rows])
+    cells = (_id_cells(row, bits[row.channel]) for row in snapshot.rows)
+    return aligned([_ID_HEAD, *cells], _LEFT)
 
 
 def by_node(snapshot: TrafficSnapshot) -> list[str]:
     """Return the table of nodes."""
     buses = {bus.channel: bus for bus in snapshot.buses}
     rows = [_node_cells(row, buses[row.channel]) for row in node_rows(snapshot.rows)]
-    return _aligned(_NODE_HEAD, rows)
+    return aligned([_NODE_HEAD, *rows], _LEFT)
 
 
 def _id_cells(row: IdRow, bus_bits: int) -> list[str]:
@@ -127,19 +129,6 @@ def _node_cells(row: _NodeRow, bus: BusRow) -> list[str]:
     return [
         *(row.channel, count_text(row.node), str(len(row.idents)), str(row.frames)),
         *(rate_text(rate_hz), share),
-    ]
-
-
-def _aligned(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return a table whose columns are as wide as their content."""
-    table = [head, *rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  ".join(
-            cell.ljust(width) if place < _LEFT else cell.rjust(width)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
     ]
 
 

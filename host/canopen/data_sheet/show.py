@@ -8,9 +8,11 @@ from typing import Any, Final, NamedTuple
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.host.canopen.data_sheet.rules.known_keys import FLAGS, NUMBERS
+from tickrig.host.text.values import aligned
 from tickrig.wire.canopen.eds.eds_value import format_value, parse_number, plain_numbers
 from tickrig.wire.canopen.eds.eds_writer import access_type
 from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescription
+from tickrig.wire.canopen.pdo import fields
 
 # Display of the values of an EDS.
 
@@ -151,30 +153,20 @@ def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
     count = document.rows.get((index, 0))
     rows = [row for row in document.entries(index) if row.sub]
     used = int.from_bytes(count.default, "little") if count and count.has_default else len(rows)
-    bit = 0
-    for row in rows[:used]:
-        value = int.from_bytes(row.default, "little")
-        if not value:
-            continue
-        target = document.rows.get((value >> 16, value >> 8 & 0xFF))
+    values = (int.from_bytes(row.default, "little") for row in rows[:used])
+    for mapped, bit in fields(filter(None, values)):
+        target = document.rows.get((mapped.index, mapped.sub))
         yield {
-            "object": f"{value >> 16:04X}h:{value >> 8 & 0xFF:02X}",
+            "object": f"{mapped.index:04X}h:{mapped.sub:02X}",
             "name": target.name if target else "",
             "bit": bit,
-            "bits": value & 0xFF,
+            "bits": mapped.bits,
         }
-        bit += value & 0xFF
 
 
 def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
     """Return a table as lines of text, the header first. The last column is not padded."""
-    lines = [[str(row[column]) for column in columns] for row in rows]
-    all_lines = [list(columns), *lines]
-    widths = [max(len(line[at]) for line in all_lines) for at in range(len(columns))]
-    return [
-        "  ".join(f"{text:<{width}}" for text, width in zip(line, widths, strict=True)).rstrip()
-        for line in all_lines
-    ]
+    return aligned([columns, *([str(row[column]) for column in columns] for row in rows)])
 
 
 # Differences between the devices of two files.
