@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -302,12 +303,10 @@ class _ControlStimulus(SignalStimulus):
         self._path, self._units = path, dict[str, str]()
         self._spans: dict[str, LinearConverter] = {}
         try:
-            described = self._request("describe")
+            self._learn(self._request("describe"))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise Refused(f"--stimulus {path}: {reason}") from None
-        try:
-            self._learn(described)
         except (AttributeError, KeyError, TypeError):
             raise Refused(f"--stimulus {path}: no emulator: what it describes is none") from None
 
@@ -388,12 +387,12 @@ def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
         link: connection to the bus. Received frames are consumed.
         span_us: duration in microseconds.
     """
-    heard: dict[int, int] = {}
+    heard = Counter[int]()
     until_us = link.now_us + span_us
     while (left_us := until_us - link.now_us) > 0:
         for _, frame in link.receive_stamped(left_us)[1]:
             if (node_id := _node_of(frame)) is not None:
-                heard[node_id] = heard.get(node_id, 0) + 1
+                heard[node_id] += 1
     return dict(sorted(heard.items()))
 
 

@@ -13,13 +13,11 @@ from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, SPECIFIER, ClientCommand, index_sub
 
-_UPLOADS: Final = frozenset(
-    {
-        ClientCommand.UPLOAD,
-        ClientCommand.UPLOAD_SEGMENT,
-        ClientCommand.BLOCK_UPLOAD,
-        ClientCommand.ABORT,
-    }
+_UPLOADS: Final = (
+    ClientCommand.UPLOAD,
+    ClientCommand.UPLOAD_SEGMENT,
+    ClientCommand.BLOCK_UPLOAD,
+    ClientCommand.ABORT,
 )
 
 PROFILE: Final = 0x6000

@@ -47,7 +47,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, NoReturn
 
 from tickrig.host.canopen.dialogue import AwaitReport, Guard, NmtRequest, Pause, Script
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
@@ -165,8 +165,7 @@ class BootTalk:
         """Wait for a boot-up or a state. End the procedure if it does not arrive."""
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
-            self.record(what, f"none within {wait_us // 1_000} ms", status.text)
-            raise BootEnded(status)
+            self.fail(what, f"none within {wait_us // 1_000} ms", status)
         self.record(what, state_text(state), "goes on")
         return state
 
@@ -177,8 +176,7 @@ class BootTalk:
         what = f"{index:04X}h:{sub:02X} {name}"
         data = yield from self.attempt(index, sub, what, tries)
         if isinstance(data, SdoFailed):
-            self.record(what, str(data), status.text)
-            raise BootEnded(status)
+            self.fail(what, str(data), status)
         return data
 
     def attempt(self, index: int, sub: int, what: str, tries: int) -> Script[bytes | SdoFailed]:
@@ -217,8 +215,7 @@ class BootTalk:
             if isinstance(error, SdoTimeout) and not answered:
                 self.record(what, "no answer", "which is allowed; goes on")
                 return
-            self.record(what, str(error), status.text)
-            raise BootEnded(status) from error
+            self.fail(what, str(error), status)
         self.record(what, "taken", "goes on")
 
     def _download(self, write: ObjectWrite, what: str, tries: int) -> Script[None]:
@@ -235,6 +232,11 @@ class BootTalk:
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
         self.record(what, _as_hex(data), "as expected" if expected else "not checked")
+
+    def fail(self, request: str, answer: str, status: BootStatus) -> NoReturn:
+        """Report a step that ends the boot-up, and end it."""
+        self.record(request, answer, status.text)
+        raise BootEnded(status)
 
     def record(self, request: str, answer: str, meaning: str) -> None:
         """Report a step."""
@@ -331,12 +333,10 @@ def _await_flash(talk: BootTalk) -> Script[None]:
         if isinstance(data, SdoFailed) or len(data) != _U32 or data[0] & BUSY:
             continue
         if error := data[0] >> 1:
-            talk.record(what, f"error {error}", _FAILED.text)
-            raise BootEnded(_FAILED)
+            talk.fail(what, f"error {error}", _FAILED)
         talk.record(what, "written", "goes on")
         return
-    talk.record(what, f"not written after {_LOOKS} polls", _FAILED.text)
-    raise BootEnded(_FAILED)
+    talk.fail(what, f"not written after {_LOOKS} polls", _FAILED)
 
 
 def _await_start(talk: BootTalk) -> Script[None]:
@@ -347,8 +347,7 @@ def _await_start(talk: BootTalk) -> Script[None]:
         if data == bytes((_START,)):
             talk.record("1F51h:01 program control", "started", "booted from the beginning")
             return
-    talk.record("1F51h:01 program control", f"not started after {_LOOKS} polls", _FAILED.text)
-    raise BootEnded(_FAILED)
+    talk.fail("1F51h:01 program control", f"not started after {_LOOKS} polls", _FAILED)
 
 
 _GUARD_ANSWER_US: Final = 100_000

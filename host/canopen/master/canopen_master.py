@@ -207,9 +207,8 @@ def _verdict(slave: NetworkSlave) -> str:
     """Return how a boot-up ended, in one line."""
     who = _who(slave)
     if slave.outcome is None:
-        return f"{who}: not booted" + (
-            ", still tried" if slave.booting else "; no message received"
-        )
+        why = ", still tried" if slave.booting else "; no message received"
+        return f"{who}: not booted{why}"
     status = slave.outcome.status
     return f"{who}: {status.value} {status.text}" if status.value else f"{who}: {status.text}"
 

@@ -231,8 +231,7 @@ def _unsaid(claims: EdsClaims | None, key: str, what: str) -> str:
 
 def _has_lss_address(binding: Binding) -> bool:
     """Return whether 1018h has vendor, product, revision and serial number (CiA 305)."""
-    present = {(entry.index, entry.sub) for entry in binding.device.entries}
-    return present.issuperset((_LSS_ADDRESS, sub) for sub in _LSS_NUMBERS)
+    return all((_LSS_ADDRESS, sub) in binding.entries for sub in _LSS_NUMBERS)
 
 
 def _has_constant_heartbeat(binding: Binding) -> bool:

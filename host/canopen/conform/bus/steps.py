@@ -99,23 +99,20 @@ class StepPlayer:
             text = " ".join(words)
             raise Disturbed(f"{text} took {took_ms} ms, which is more than {within_ms} ms")
 
-    def _act(self, verb: str, *words: str) -> None:
+    def _act(self, *words: str) -> None:
         """Operate the inputs of the device, or compare its outputs."""
-        if verb == "power-cycle":
-            self._act("power", "off")
-            self._exchange.wait(_POWER_OFF_MS)
-            self._exchange.forget_all()
-            self._act("power", "on")
-            return
-        if verb == "expect":
-            self._compare(*words)
-            return
-        self._stimulate(verb, *words)
-
-    def _compare(self, name: str, wanted: str) -> None:
-        got = self._stimulate("output", name)
-        if _value(got) != _value(wanted):
-            raise StepFailed(f"output {name} is {got}, want {wanted}")
+        match words:
+            case ("power-cycle",):
+                self._act("power", "off")
+                self._exchange.wait(_POWER_OFF_MS)
+                self._exchange.forget_all()
+                self._act("power", "on")
+            case ("expect", name, wanted):
+                got = self._stimulate("output", name)
+                if _value(got) != _value(wanted):
+                    raise StepFailed(f"output {name} is {got}, want {wanted}")
+            case _:
+                self._stimulate(*words)
 
     def _stimulate(self, *words: str) -> str:
         if self._stimulus is None:

@@ -15,7 +15,11 @@ from tickrig.host.canopen.eds import eds_number
 from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.eds_file import shorten
 
-_NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
+_NEEDED: Final = {
+    "DeviceInfo": f"{known_keys.NAMES[0]}=",
+    "MandatoryObjects": "SupportedObjects=0",
+}
+"""Sections that every tool needs, with the first line of each."""
 _DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
 _TIME: Final = re.compile(r"[0-9]{1,2}:[0-9]{2} ?[AP]M", re.ASCII | re.IGNORECASE)
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]*|0x[0-9a-f]+", re.ASCII | re.IGNORECASE)
@@ -44,13 +48,9 @@ def number(document: Document, section: str, key: str) -> int | None:
 
 def sections(document: Document) -> Iterator[RuleFinding]:
     """Find missing sections that every tool needs."""
-    for title in _NEEDED:
+    for title, first in _NEEDED.items():
         if title not in document.file.sections:
-            last = len(document.texts)
-            first = (
-                "SupportedObjects=0" if title == "MandatoryObjects" else f"{known_keys.NAMES[0]}="
-            )
-            added = Edit(last, EditPlace.AFTER, ("", f"[{title}]", first))
+            added = Edit(len(document.texts), EditPlace.AFTER, ("", f"[{title}]", first))
             edits = () if document.head_is_lost else (added,)
             yield document.found("section-missing", f"[{title}] is missing", "", 0, *edits)
 

@@ -139,9 +139,8 @@ def _mended(
     """Return the edits that correct a list. Another list has its own finding."""
     each = next(one for one in found if one.title == title)
     if title not in document.file.sections:
-        return (
-            Edit(len(document.texts), EditPlace.AFTER, ("", f"[{title}]", "SupportedObjects=0")),
-        )
+        added = "", f"[{title}]", "SupportedObjects=0"
+        return (Edit(len(document.texts), EditPlace.AFTER, added),)
     listed = {index for one in found for index in one.indices if not _is_wrong(one.title, index)}
     wanted = list(
         dict.fromkeys(

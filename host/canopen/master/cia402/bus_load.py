@@ -99,11 +99,9 @@ def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
 
 def pdo_load(slave: BusSlave, master: BusMaster) -> _Load:
     """Return the load of periodic PDOs."""
-    written_us = (
-        drive_driver.period_us_of(slave) or master.sync_period_us
-        if drive_driver.is_drive(slave)
-        else 0
-    )
+    written_us = 0
+    if drive_driver.is_drive(slave):
+        written_us = drive_driver.period_us_of(slave) or master.sync_period_us
     return fsum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
 
 

@@ -300,9 +300,8 @@ class DriveDriver:
     def halt(self) -> None:
         """Do a quick stop. A drive that is not in Operation enabled stays as it is."""
         state = state_of(self.statusword)
-        if (
-            word := drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
-        ) is not None:
+        word = drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
+        if word is not None:
             self.controlword, self._unseen = word, True
 
     async def switch_to(self, goal: DriveState | str) -> None:
@@ -439,10 +438,8 @@ class DriveDriver:
             self.refusals.append(error)
 
     def _where(self) -> str:
-        state = self.state
-        return (
-            f"{state.words if state is not None else 'unknown'} (statusword {self.statusword:04X}h)"
-        )
+        state = "unknown" if self.state is None else self.state.words
+        return f"{state} (statusword {self.statusword:04X}h)"
 
 
 # The axes of one node, driven in its period.
