@@ -62,14 +62,10 @@ def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
 
 def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
     """Return the PDO that is disabled by the writes so far and enabled by a remaining write."""
-    was = {at: data for at, data in done if at[1] == _COB_ID and _is_pdo(at[0])}
-    will = {at: data for at, data in left if at[1] == _COB_ID and _is_pdo(at[0])}
+    was = {at: data for at, data in done if at[1] == _COB_ID and at[0] in PDOS}
+    will = {at: data for at, data in left if at[1] == _COB_ID and at[0] in PDOS}
     open_pdos = [at for at in was.keys() & will if _is_off(was[at]) and not _is_off(will[at])]
     return "".join(f"the PDO of {index:04X}h stays disabled" for index, _ in open_pdos)
-
-
-def _is_pdo(index: int) -> bool:
-    return any(index in area for area in PDOS)
 
 
 def _is_off(data: bytes) -> bool:

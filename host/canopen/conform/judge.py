@@ -71,20 +71,18 @@ from tickrig.host.canopen.conform.notation import BoundCheck, Unbound, bind_chec
 from tickrig.host.canopen.conform.permission import Permission
 from tickrig.host.canopen.conform.subject import Subject
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, FrameLine, Result
+from tickrig.host.canopen.conform.write_order import PDOS
 
 _LSS_ANSWER: Final = "7E4#"
 """CAN-ID that all LSS slaves share. A frame does not show which slave sent it."""
 _HISTORY: Final = (0x1003, 0)
-_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 _START: Final = "000#01"
 _UPLOADS: Final = ("UE", "US", "BU", "OD")
 """Groups that judge uploads. The checks of other groups only use uploads to read values."""
 _UNSEEN: Final = "could not be read back, see the checks of group US"
 _UNPREPARED: Final = "could not be prepared"
-_MAY_BE_CONSTANT: Final = frozenset(
-    (0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *_PDO_PARAMETERS)
-)
+_MAY_BE_CONSTANT: Final = frozenset((0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *PDOS))
 """Objects that are "rw; const, if not changeable" (CiA 301 v4.2.0, 7.5.2)."""
 _READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
 _NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
@@ -104,7 +102,7 @@ def _is_segment(command: str) -> bool:
 def _enables(action: Action) -> bool:
     """Return whether a step sets the COB-ID of a PDO. Every device accepts its own COB-ID."""
     index, sub = action.address if isinstance(action, Write) else (0, 0)
-    return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
+    return isinstance(action, Macro) or (index in PDOS and sub == 1)
 
 
 def _is_constant(action: Action, error: StepFailed) -> bool:

@@ -13,7 +13,7 @@ from tickrig.host.canopen.conform.bus.exchange import MS_US, BusExchange, NotAll
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, number_of
 from tickrig.host.canopen.conform.check import Address, Level
 from tickrig.host.canopen.conform.notation import BoundCheck
-from tickrig.host.canopen.conform.write_order import Values, Write, in_order, is_standard
+from tickrig.host.canopen.conform.write_order import PDOS, Values, Write, in_order, is_standard
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, FLAG_30, NMT_COB_ID, NmtCommand, NmtState
@@ -34,7 +34,6 @@ _QUIET: Final = (
 )
 """Objects that are 0 when a check begins, so that there is no SYNC, guarding or heartbeat."""
 _CONSUMERS: Final = 0x1016
-_PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 INHIBIT_TIME, EVENT_TIMER = 3, 5
 _TIMERS: Final = (INHIBIT_TIME, EVENT_TIMER)
 """Timers by which PDOs are sent, held back, or missed without a request of the tester."""
@@ -93,7 +92,7 @@ class KnownState:
     def prepare(self) -> None:
         """Bring the known objects into the state in which checks begin."""
         for at, value in self.original.items():
-            is_timer = at[1] in _TIMERS and at[0] in _PDOS
+            is_timer = at[1] in _TIMERS and at[0] in PDOS
             if is_timer or at in _QUIET or (at[0] == _CONSUMERS and at[1]):
                 self._begin[at] = bytes(len(value))
             elif at == _SYNC_COB_ID:

@@ -8,6 +8,8 @@ from operator import attrgetter
 from typing import Final
 
 from tickrig.host.canopen.conform import check
+from tickrig.host.canopen.conform.binding.wanted import COMMUNICATION_AREA, PROFILE_AREA
+from tickrig.host.canopen.conform.write_order import PDOS
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
@@ -99,8 +101,6 @@ _ACCESS: Final = "CiA 301 v4.2.0, 7.4.4, access attributes"
 _TYPES: Final = "CiA 301 v4.2.0, 7.4.7, data types"
 _DEFAULTS: Final = "CiA 306-1, DefaultValue; CiA 301 v4.2.0, 7.5.2"
 
-_COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
-_PROFILE_AREA: Final = range(0x6000, 0xA000)
 _NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
 """Objects of store, restore and program download.
 
@@ -110,7 +110,6 @@ The tester never writes these objects, not even to provoke a refusal.
 _ERROR_FIELD: Final = 0x1003
 _CONSTANTS: Final = (0x1000, 0x1018)
 """Objects that have the value in the EDS unless the bus can write them."""
-_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _IN_USE: Final = (*(0x1005, 0x1006, 0x1012, 0x1014), *range(0x1200, 0x1300), *range(0x1400, 0x1C00))
 """Objects that CiA 301 protects from changes while the function that they configure is enabled."""
 _KEPT: Final = (
@@ -162,7 +161,7 @@ class _Maker:
     def _default(self, entry: EntryDescription) -> Iterator[check.Check]:
         """Compare writable objects of the communication area with their defaults."""
         value = self._power_on(entry)
-        if value is None or not entry.writable or entry.index not in _COMMUNICATION_AREA:
+        if value is None or not entry.writable or entry.index not in COMMUNICATION_AREA:
             return
         if entry.index != _ERROR_FIELD:
             title, action = "as its DefaultValue says", _hold(entry, value)
@@ -176,7 +175,7 @@ class _Maker:
     def _may_write(self, index: int) -> bool:
         if index in _NEVER_WRITTEN or index in self._never:
             return False
-        return index not in _PROFILE_AREA or index in self._allow
+        return index not in PROFILE_AREA or index in self._allow
 
 
 def object_checks(
@@ -332,10 +331,10 @@ def _is_constant(entry: EntryDescription, counts: bool) -> bool:
         return False
     if Access.CONST in entry.access or entry.index in _CONSTANTS:
         return True
-    return counts and entry.index not in COUNTS and entry.index in _COMMUNICATION_AREA
+    return counts and entry.index not in COUNTS and entry.index in COMMUNICATION_AREA
 
 
 def _may_have_none(entry: EntryDescription) -> bool:
     """Return whether an entry may have no value, such as an error history or an empty string."""
-    reserved = entry.index in _PDO_PARAMETERS and entry.sub == _RESERVED_SUB
+    reserved = entry.index in PDOS and entry.sub == _RESERVED_SUB
     return reserved or entry.index == _ERROR_FIELD or not entry.size

@@ -18,8 +18,9 @@ _SYNC_COUNTER: Final = 0x1019
 _EMCY: Final = 0x1014
 _CONSUMERS: Final = 0x1016
 _SERVERS: Final = range(0x1200, 0x1300)
-PDOS: Final = (range(0x1400, 0x1600), range(0x1800, 0x1A00))
-_MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
+PDOS: Final = frozenset((*range(0x1400, 0x1600), *range(0x1800, 0x1A00)))
+"""Communication parameters of all PDOs."""
+_MAPPINGS: Final = frozenset((*range(0x1600, 0x1800), *range(0x1A00, 0x1C00)))
 _TO_MAPPING: Final = 0x200
 _COB_ID_BYTES: Final = 4
 
@@ -60,9 +61,9 @@ def is_too_long(at: Address, value: bytes) -> bool:
 def _bytes_of(at: Address) -> int:
     """Return the length of a COB-ID or a number of mapped objects, or 0 for other objects."""
     index, sub = at
-    if any(index in area for area in _MAPPINGS) and not sub:
+    if index in _MAPPINGS and not sub:
         return 1
-    pdo_cob_id = sub == 1 and any(index in area for area in PDOS)
+    pdo_cob_id = sub == 1 and index in PDOS
     return _COB_ID_BYTES if pdo_cob_id or at in {(_SYNC, 0), (_EMCY, 0)} or _is_server(at) else 0
 
 
@@ -72,9 +73,9 @@ def _is_server(at: Address) -> bool:
 
 def _pdo_of(index: int) -> int:
     """Return the communication parameter of the PDO to which an index belongs, or 0 for none."""
-    if any(index in area for area in PDOS):
+    if index in PDOS:
         return index
-    return index - _TO_MAPPING if any(index in area for area in _MAPPINGS) else 0
+    return index - _TO_MAPPING if index in _MAPPINGS else 0
 
 
 def _pdo(pdo: int, left: Values, number: _Number) -> Iterator[Write]:
