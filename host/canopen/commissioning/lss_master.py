@@ -150,12 +150,9 @@ class LssMaster:
 
         The errors are those of `configure_node_id`.
         """
-        return LssAddress(
-            *(
-                number_of(self._command(message(LssCommand(LssCommand.INQUIRE_VENDOR + sub))))
-                for sub in range(4)
-            )
-        )
+        inquiries = range(LssCommand.INQUIRE_VENDOR, LssCommand.INQUIRE_SERIAL + 1)
+        answers = [self._command(message(LssCommand(inquiry))) for inquiry in inquiries]
+        return LssAddress(*map(number_of, answers))
 
     def node_id(self) -> int:
         """Return the active node-ID of the slave in configuration, or 255 for none."""

@@ -60,8 +60,9 @@ class NodeBus:
         """
         now_us, frames = self._link.receive_stamped(max(0, until_us - self._link.now_us))
         for _, frame in frames:
-            if frame.can_id in _ERROR_CONTROL and not (frame.remote or frame.extended):
-                self._note(frame)
+            reports = frame.can_id in _ERROR_CONTROL and not (frame.remote or frame.extended)
+            if reports and (state := state_of(frame)) is not None:
+                self.states[frame.can_id - ERROR_CONTROL_COB_ID] = state
         return now_us, frames
 
     def gather(self, span_us: int) -> list[CanFrame]:
@@ -130,11 +131,6 @@ class NodeBus:
 
     def _guard(self, can_id: int) -> None:
         self._link.send((CanFrame(can_id, remote=True, remote_length=1),))
-
-    def _note(self, frame: CanFrame) -> None:
-        state = state_of(frame)
-        if state is not None:
-            self.states[frame.can_id - ERROR_CONTROL_COB_ID] = state
 
 
 # The scan for nodes on a bus. It reads the device type of each node-ID and changes nothing.
