@@ -298,9 +298,9 @@ def _select(lss: LssMaster, *address: int) -> None:
 
 
 def _set_node(lss: LssMaster, node_id: int) -> None:
-    lss.configure_node_id(
-        node_id if node_id == _UNCONFIGURED else _within(node_id, 1, _MOST_NODE_ID)
-    )
+    if node_id != _UNCONFIGURED:
+        _within(node_id, 1, _MOST_NODE_ID)
+    lss.configure_node_id(node_id)
 
 
 def _configure_bit_rate(lss: LssMaster, table: int, index: int) -> None:
@@ -447,9 +447,8 @@ class Gateway:
     def _carry_out(self, request: _GatewayRequest) -> str:
         verb = self._verbs.get(request.verb)
         if verb is None:
-            raise GatewayError(
-                f"{request.verb!r} is not supported", _GatewayErrorCode.NOT_SUPPORTED
-            )
+            text = f"{request.verb!r} is not supported"
+            raise GatewayError(text, _GatewayErrorCode.NOT_SUPPORTED)
         return verb(request)
 
     def _node_of(self, request: _GatewayRequest, least: int) -> int:

@@ -446,7 +446,10 @@ class CanLink:
         """
         name = f"{interface}:{channel}"
         try:
-            return cls(_open(channel, interface, bit_rate), name)
+            given: dict[str, Any] = {} if bit_rate is None else {"bitrate": bit_rate}
+            bus = can.Bus(channel=channel, interface=interface, **given)
+            prepare_bus(bus, interface)
+            return cls(bus, name)
         except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
             raise LinkClosed(f"cannot open {name}: {first_line(error)}") from error
 
@@ -537,13 +540,6 @@ class CanLink:
         if (frame := to_frame(message)) is None:
             return ()
         return ((self._stamps.at_us(message.timestamp, self._polled_us, self.now_us), frame),)
-
-
-def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
-    given: dict[str, Any] = {} if bit_rate is None else {"bitrate": bit_rate}
-    bus = can.Bus(channel=channel, interface=interface, **given)
-    prepare_bus(bus, interface)
-    return bus
 
 
 def _is_full(error: Exception) -> bool:
