@@ -54,7 +54,7 @@ from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 _HTML: Final = "--html"
 
 
-def check_files(files: Mapping[str, Path]) -> None:
+def _check_files(files: Mapping[str, Path]) -> None:
     """Raise Refused if one of the files cannot be written.
 
     Args:
@@ -186,7 +186,7 @@ class Conformance:
         self._files: dict[str, Path] = {
             f"--{name.replace('_', '-')}": options[name] for name in _FILES if options[name]
         }
-        check_files(self._files)
+        _check_files(self._files)
         _keep_inputs(self._files, self._inputs())
         self._only = patterns(options["only"])
         self._baseline = _read_baseline(options["baseline"])

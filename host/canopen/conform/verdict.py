@@ -137,7 +137,7 @@ class Report:
         return self.exit_status_with(self.count(CheckVerdict.FAIL))
 
     def exit_status_with(self, failures: int) -> int:
-        """Return the exit status of the run if only so many failures count."""
+        """Return the exit status of the run if this number of failures counts."""
         if failures:
             return FAILED
         if self.aborted or self.with_verdict(CheckVerdict.INCONCLUSIVE, CheckVerdict.BLOCKED):
