@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import click
-from click.shell_completion import CompletionItem
 
 from tickrig.host.cli.messages import Refused
-from tickrig.host.cli.options import HarmlessCommand, time_option, version_option, works_in
+from tickrig.host.cli.options import (
+    Decorator,
+    HarmlessCommand,
+    time_option,
+    version_option,
+    works_in,
+)
 from tickrig.host.cli.start import load, loading
 
 _VERBS: Final = "tickrig.host.rrc.verbs"
@@ -41,18 +45,6 @@ class RrcCall:
     watchdog_us: int
     stable: bool
     pad: str | None
-
-
-class _Url(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
-    """A port that the shell completes as a file."""
-
-    name = "url"
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Let the shell offer file names."""
-        return [CompletionItem(incomplete, type="file")]
 
 
 class _Verb(HarmlessCommand):
@@ -97,7 +89,7 @@ class _RrcGroup(HarmlessCommand, click.Group):
 
 
 @click.group(cls=_RrcGroup, subcommand_metavar="[VERB [ARGS]...]", invoke_without_command=True)
-@click.argument("url", type=_Url())
+@click.argument("url", type=click.Path(readable=False))
 @click.option("--panel", is_flag=True, help="Show a panel in this terminal, and drive by keys.")
 @click.option(
     "--pad", metavar="DEVICE", help="Drive by a game pad while a button is held: /dev/input/event5."
@@ -166,11 +158,27 @@ _for_option: Final = time_option("--for", "for_us", help="End after this time.")
 _json_option: Final = click.option(
     "--json", "as_json", is_flag=True, help="Print the answer as JSON."
 )
-_speed_option: Final = click.option(
-    "--speed", type=_SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
-)
 
-_Decorator = Callable[[Callable[..., Any]], click.Command]
+
+def _number(option: str, name: str, kind: click.IntRange, default: int, text: str) -> Decorator:
+    """Return an option whose help shows its default."""
+    return click.option(option, name, type=kind, default=default, show_default=True, help=text)
+
+
+def _bound(option: str, name: str, what: str) -> Decorator:
+    """Return an option that limits a quantity of `rrc limit`."""
+    return click.option(option, name, type=_BYTE, default=255, help=f"Most of {what}.  [no limit]")
+
+
+def _pair(option: str, kind: click.IntRange, default: int, text: str) -> Decorator:
+    """Return an option with a value for each direction of the stick."""
+    shown = f"{text}  [{default} {default}]"
+    return click.option(
+        option, type=kind, nargs=2, default=(default, default), metavar="V W", help=shown
+    )
+
+
+_speed_option: Final = _number("--speed", "speed", _SPEED, 1, "Speed mode, 1 is the slowest.")
 
 
 @main.command("status")
@@ -210,17 +218,9 @@ def _drive(**options: Any) -> None:
 @main.command("limit")
 @click.argument("v_pct", metavar="V", type=_PERCENT)
 @click.argument("w_pct", metavar="W", type=_PERCENT)
-@click.option("--sum", "sum_pct", type=_BYTE, default=255, help="Most of |v| + |w|.  [no limit]")
-@click.option(
-    "--product", "product_pct", type=_BYTE, default=255, help="Most of |v| * |w| / 100.  [no limit]"
-)
-@click.option(
-    "--radius",
-    "radius_pct",
-    type=_BYTE,
-    default=255,
-    help="Most of the root of v² + w².  [no limit]",
-)
+@_bound("--sum", "sum_pct", "|v| + |w|")
+@_bound("--product", "product_pct", "|v| * |w| / 100")
+@_bound("--radius", "radius_pct", "the root of v² + w²")
 @_speed_option
 @_for_option
 @click.option("--leave", is_flag=True, help="End at once; the stick stays on, without watchdog.")
@@ -238,57 +238,19 @@ def _limit(**options: Any) -> None:
 
 
 @main.command("stick")
-@click.option(
-    "--low", type=_PERCENT, nargs=2, default=(0, 0), metavar="V W", help="Counts as 0.  [0 0]"
-)
-@click.option(
-    "--high",
-    type=_PERCENT,
-    nargs=2,
-    default=(100, 100),
-    metavar="V W",
-    help="Counts as 100.  [100 100]",
-)
-@click.option(
-    "--exponent",
-    type=_NIBBLE,
-    nargs=2,
-    default=(0, 0),
-    metavar="V W",
-    help="Output is input ^ (1 + 0.1 * exponent), 0..15.  [0 0]",
-)
-@click.option(
+@_pair("--low", _PERCENT, 0, "Counts as 0.")
+@_pair("--high", _PERCENT, 100, "Counts as 100.")
+@_pair("--exponent", _NIBBLE, 0, "Output is input ^ (1 + 0.1 * exponent), 0..15.")
+@_number(
     "--reverse",
     "reverse_mode",
-    type=click.IntRange(0, 3),
-    default=0,
-    show_default=True,
-    help="0 plain, 1 no backing, 2 gears, 3 gears, backing toward the stick.",
+    click.IntRange(0, 3),
+    0,
+    "0 plain, 1 no backing, 2 gears, 3 gears, backing toward the stick.",
 )
-@click.option(
-    "--neutral",
-    "neutral_pct",
-    type=_PERCENT,
-    default=5,
-    show_default=True,
-    help="Radius of rest, gears.",
-)
-@click.option(
-    "--switch",
-    "switch_deg",
-    type=_ANGLE,
-    default=30,
-    show_default=True,
-    help="Angle up to which R is chosen.",
-)
-@click.option(
-    "--fade",
-    "fade_deg",
-    type=_ANGLE,
-    default=45,
-    show_default=True,
-    help="Angle from which R fades.",
-)
+@_number("--neutral", "neutral_pct", _PERCENT, 5, "Radius of rest, gears.")
+@_number("--switch", "switch_deg", _ANGLE, 30, "Angle up to which R is chosen.")
+@_number("--fade", "fade_deg", _ANGLE, 45, "Angle from which R fades.")
 @works_in(f"{_VERBS}:stick")
 def _stick(**options: Any) -> None:
     """Shape the stick: dead zones, exponents, and backing.
