@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from types import FrameType
-from typing import ClassVar, Final, Self
+from typing import ClassVar, Final
 
 import click
 from rich.text import Text
@@ -247,7 +247,7 @@ def run() -> None:
     """Show the panel until it is closed. Then stop the chair."""
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None
-    ended = Ended()
+    ended, stop = Ended(), threading.Event()
     with ExitStack() as stack:
         pad = None if call.pad is None else stack.enter_context(closing(open_pad(call.pad)))
         chair = stack.enter_context(open_chair(ended))
@@ -258,47 +258,21 @@ def run() -> None:
             ended.received(number, frame)
             panel.end()
 
-        with taking_signals(received), _Stepper(pilot, panel.end) as stepper:
-            if ended.number:  # it came while the port was opened
+        def step() -> None:
+            try:
+                while not stop.is_set():
+                    pilot.step()
+            finally:
                 panel.end()
-            panel.run()
+
+        with taking_signals(received), ThreadPoolExecutor(1, "rrc") as pool:
+            stepping = pool.submit(step)
+            try:
+                if ended.number:  # it came while the port was opened
+                    panel.end()
+                panel.run()
+            finally:
+                stop.set()
             if panel.interrupted:
                 ended.received(signal.SIGINT, None)
-        stepper.raise_failure()
-
-
-class _Stepper:
-    """A thread that steps a pilot during a `with` block.
-
-    Args:
-        pilot: pilot to step.
-        failed: function that is called from that thread if the line fails.
-    """
-
-    def __init__(self, pilot: Pilot, failed: Callable[[], None]) -> None:
-        self._pilot, self._failed = pilot, failed
-        self._stop = threading.Event()
-        self._failure: Exception | None = None
-        self._thread = threading.Thread(target=self._run, name="rrc")
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *of_block: object) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def raise_failure(self) -> None:
-        """Raise the error that ended the thread."""
-        if self._failure is not None:
-            raise self._failure
-
-    def _run(self) -> None:
-        try:
-            while not self._stop.is_set():
-                self._pilot.step()
-        except Exception as error:
-            self._failure = error
-        finally:
-            self._failed()
+        stepping.result()
