@@ -31,18 +31,8 @@ from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Joystick, Limit
 from tickrig.wire.rrc.replies import StatusA
 
-_FIELDS: Final = {
-    "in_v_pct": "stick_v_pct",
-    "in_w_pct": "stick_w_pct",
-    "out_v_pct": "out_v_pct",
-    "out_w_pct": "out_w_pct",
-    "gauge": "gauge",
-    "speed_mode": "speed_mode",
-    "speed_up_count": "speed_up_count",
-    "speed_down_count": "speed_down_count",
-    "alarm_count": "alarm_count",
-}
-"""Values that are printed of a status line, under the emulator's names of inputs and outputs."""
+_SHOWN_AS: Final = {"in_v_pct": "stick_v_pct", "in_w_pct": "stick_w_pct"}
+"""Values of a status line that the emulator's inputs have under another name."""
 
 _MOST_BEEPS: Final = 10
 _SHOWN_US: Final = 100_000
@@ -107,8 +97,7 @@ def _lost(call: RrcCall, error: LinkError, chair: Chair | None) -> str:
 
 def described(status: StatusA) -> dict[str, int]:
     """Return the values of a status line by the names that the emulator uses."""
-    values = asdict(status)
-    return {shown: values[name] for name, shown in _FIELDS.items()}
+    return {_SHOWN_AS.get(name, name): value for name, value in asdict(status).items()}
 
 
 def status(*, as_json: bool) -> None:
