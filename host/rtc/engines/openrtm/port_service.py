@@ -7,7 +7,7 @@ import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from omniORB import CORBA
 
@@ -30,41 +30,7 @@ from tickrig.host.text.log import log_of
 _Profile = Any
 """A ConnectorProfile of CORBA."""
 
-_CONNECTIONS_LOG: Final = log_of(__name__)
-
-
-class _PortSystem(Protocol):
-    """The ports of one system, and its ORB.
-
-    Attributes:
-        threads: threads that call peers, for all data ports.
-        arrivals: received values, until the next tick.
-        ending: connectors that have ended by ID, until their peers are notified.
-    """
-
-    orb: Orb
-    calls: CallQueue
-    threads: PeerThreads
-    arrivals: Arrivals
-    ending: dict[str, _PeerConnection]
-
-    def find(self, reference: Reference) -> AnyPort | None:
-        """Return the local port of a reference, or None if it belongs to a peer."""
-        ...
-
-    def connect(
-        self, ports: tuple[AnyPort, AnyPort], profile: _Profile, values: dict[str, str]
-    ) -> None:
-        """Connect two local ports."""
-        ...
-
-    def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return the profile of a connector of two local ports, if peers know both, else None."""
-        ...
-
-    def schedule(self, connector: ConnectorBase) -> None:
-        """Make a connector push from now on."""
-        ...
+_LOG: Final = log_of(__name__)
 
 
 class _PeerConnection:
@@ -99,9 +65,7 @@ class _PeerConnection:
         try:
             self.peer.notify_disconnect(self.connector_id)
         except CORBA.Exception as error:
-            _CONNECTIONS_LOG.info(
-                "%s could not be notified of the end: %s", self.peer_name, explain(error)
-            )
+            _LOG.info("%s could not be notified of the end: %s", self.peer_name, explain(error))
 
 
 class _PeerConnections:
@@ -112,7 +76,7 @@ class _PeerConnections:
         system: all ports of its system.
     """
 
-    def __init__(self, port: AnyPort, system: _PortSystem) -> None:
+    def __init__(self, port: AnyPort, system: SystemPorts) -> None:
         self._port, self._system = port, system
         self._by_id: dict[str, _PeerConnection] = {}
         self._closed = False
@@ -265,7 +229,6 @@ def _end_at(place: connector_ends.ConnectorPlace, port: AnyPort) -> connector_en
 
 # PortService: how tools and peers join a port of ours (OMG RTC 1.0; OpenRTM-aist, PortBase).
 
-_LOG: Final = log_of(__name__)
 
 _OK: Final = ReturnCode.RTC_OK
 _NAME_LENGTH: Final = 100

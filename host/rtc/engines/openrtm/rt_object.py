@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.engines.openrtm.context import ServantReferences
 from tickrig.host.rtc.engines.openrtm.orb import Reference, nvlist
+from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc.system.manager import Manager
 
 INTERFACE: Final = "OpenRTM.DataFlowComponent"
-
-
-class _Ports(Protocol):
-    """The ports of a component as an ORB serves them."""
-
-    def services(self) -> list[Reference]:
-        """Return a PortService for each port."""
-        ...
-
-    def close(self) -> None:
-        """Stop accepting calls for the ports."""
-        ...
 
 
 class RtObjectServant:
@@ -46,7 +35,7 @@ class RtObjectServant:
     ) -> None:
         self._component, self._manager, self._references = component, manager, references
         self._calls, self._stubs = references.calls, references.stubs
-        self.ports: _Ports | None = None
+        self.ports: ComponentPorts | None = None
         self.configuration: Reference = None
 
     def get_component_profile(self) -> Any:
