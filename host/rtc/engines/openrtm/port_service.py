@@ -255,12 +255,8 @@ class _PortAnswers:
         describe: Callable[[], Any],
     ) -> None:
         self._last_line = ""
-        self._port, self._connections, self._calls, self._describe = (
-            port,
-            connections,
-            calls,
-            describe,
-        )
+        self._port, self._connections = port, connections
+        self._calls, self._describe = calls, describe
 
     def get_port_profile(self) -> Any:
         """Return the profile of the port."""
@@ -447,12 +443,8 @@ class SystemPorts:
     ) -> None:
         """Connect two local ports."""
         if isinstance(ports[0], DataPort):
-            values = {
-                **values,
-                connector_ends.ENDIAN: connector_ends.agreed_endian(
-                    values.get(connector_ends.ENDIAN, "")
-                ),
-            }
+            endian = connector_ends.agreed_endian(values.get(connector_ends.ENDIAN, ""))
+            values = {**values, connector_ends.ENDIAN: endian}
         names = {"name": profile.name, "connector_id": profile.connector_id}
         self._manager.connect(ports[0].full_name, ports[1].full_name, values, **names)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any, Final
 
 from tickrig.host.rtc.component import RtComponent
@@ -40,15 +41,10 @@ class RtObjectServant:
 
     def get_component_profile(self) -> Any:
         """Return the profile of the component."""
-        spec, name = self._component.spec, self._component.instance_name
         profiles = [port.get_port_profile() for port in self.get_ports()]
         return self._stubs.rtc.ComponentProfile(
-            instance_name=name,
-            type_name=spec.type_name,
-            description=spec.description,
-            version=spec.version,
-            vendor=spec.vendor,
-            category=spec.category,
+            **asdict(self._component.spec),
+            instance_name=self._component.instance_name,
             port_profiles=profiles,
             parent=None,
             properties=nvlist(_properties_of(self._component)),
@@ -124,10 +120,7 @@ def _properties_of(component: RtComponent) -> dict[str, str]:
         "implementation_id": spec.type_name,
         "type_name": spec.type_name,
         "instance_name": component.instance_name,
-        "description": spec.description,
-        "version": spec.version,
-        "vendor": spec.vendor,
-        "category": spec.category,
+        **asdict(spec),
         "language": "Python",
         "lang_type": "SCRIPT",
         "naming.type": "corba",
