@@ -187,7 +187,7 @@ def _read(profile: messages.LitePortProfile) -> tuple[str, LitePortType[Any]]:
     return name, port_type
 
 
-_PORTS_LOG: Final = log_of(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class PortBridges:
@@ -244,7 +244,7 @@ class PortBridges:
 
     def _drop(self, where: str, why: FieldError | str) -> None:
         self.dropped += 1
-        _PORTS_LOG.warning("dropped at %s: %s", where, why)
+        _LOG.warning("dropped at %s: %s", where, why)
 
 
 _MIRROR_US: Final = 100_000
@@ -268,8 +268,6 @@ _TO_INACTIVE: Final = {
     LiteState.ERROR: LiteCommand.RESET,
 }
 """Request that brings a device one step nearer to Inactive, for on_reset of the proxy."""
-
-_LOG: Final = log_of(__name__)
 
 
 class RtcLiteProxy(RtComponent):

@@ -82,7 +82,7 @@ _SILENCE_US: Final = 20_000
 _KEPT: Final = 8
 """Number of frames that are kept, so that a report can show the last frames."""
 
-_FRAMES_LOG: Final = log_of(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class _ReplyDecoder(Protocol):
@@ -137,14 +137,14 @@ class _FrameLink:
         try:
             self._link.send(self._encode(frame))
         except LinkError as error:
-            _FRAMES_LOG.debug("not sent: %s", error)
+            _LOG.debug("not sent: %s", error)
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
         """Wait for bytes. Return the frames that they complete, or None if the line is gone."""
         try:
             data = self._link.receive(timeout_us)
         except LinkError as error:
-            _FRAMES_LOG.debug("not received: %s", error)
+            _LOG.debug("not received: %s", error)
             return None
         if data:
             self._byte_us = self.now_us
@@ -156,7 +156,7 @@ class _FrameLink:
         return frames
 
     def _note(self, arrow: str, frame: LiteFrame) -> None:
-        _FRAMES_LOG.debug("%s %s", arrow, frame.body)
+        _LOG.debug("%s %s", arrow, frame.body)
         self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")
 
 
@@ -234,8 +234,6 @@ _MEANINGS: Final[Mapping[int, str]] = {
     codes.LiteLinkFault.CHECKSUM: "FH: wrong checksum",
     codes.LiteLinkFault.UNKNOWN: "FU: unknown",
 }
-
-_LOG: Final = log_of(__name__)
 
 
 class RequestChannel:

@@ -115,8 +115,6 @@ _IDLE_S: Final = 5.0
 
 _MOST: Final = 256
 
-_CONNECTORS_LOG: Final = log_of(__name__)
-
 
 class PeerCaller(Protocol):
     """An object that makes calls to peers in its own threads, `PeerThread` or `PeerThreads`."""
@@ -190,7 +188,7 @@ class PeerThreads:
             try:
                 again_s = call()
             except Exception:
-                _CONNECTORS_LOG.exception("%s: a call raised", self._name)
+                _LOG.exception("%s: a call raised", self._name)
             else:
                 self._plan(call, again_s)
 

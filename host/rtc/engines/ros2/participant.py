@@ -38,7 +38,7 @@ _MOST_MESSAGES: Final = 100
 """Number of kinds of messages that are logged. Further kinds are not logged."""
 
 _DESCRIPTORS: Final = "/dev/fd"
-_DDS_LOG: Final = log_of(__name__)
+_LOG: Final = log_of(__name__)
 _NUMBER: Final = re.compile(r"(?<![0-9a-f])(?=[a-f]*+[0-9])[0-9a-f]++")
 _HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
 
@@ -83,7 +83,7 @@ def _read(descriptor: int) -> None:
             kind = _NUMBER.sub("#", text)
             if kind not in known and len(known) < _MOST_MESSAGES:
                 known.add(kind)
-                _DDS_LOG.warning("ros2: DDS says: %s", text)
+                _LOG.warning("ros2: DDS says: %s", text)
 
 
 _LOOPBACK: Final = "127.0.0.1"
@@ -207,8 +207,6 @@ _INFINITE_NS: Final = 0x7FFF_FFFF_FFFF_FFFF
 
 _UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
 """Mask for handles of 64 bits, which Cyclone DDS's Python returns with or without a sign."""
-
-_LOG: Final = log_of(__name__)
 
 
 class OwnEndpoint(Protocol):

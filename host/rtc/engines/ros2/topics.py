@@ -19,7 +19,7 @@ from tickrig.host.text.log import log_of
 
 # The writer of the messages of one port to its topic, in the thread of the engine.
 
-_WRITER_LOG: Final = log_of(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class TopicWriter:
@@ -47,9 +47,7 @@ class TopicWriter:
                 self._writer = self._participant.writer(self.entry)
         except DDSException as error:
             self._failed = True
-            _WRITER_LOG.warning(
-                "%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error)
-            )
+            _LOG.warning("%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error))
 
     def put(self, message: Any) -> PortStatus:
         """Write a message, without waiting for the readers of the topic.
@@ -69,7 +67,7 @@ class TopicWriter:
             return PortStatus.BUFFER_TIMEOUT if late else PortStatus.PORT_ERROR
         except Exception as error:  # whatever its encoder says of a value
             if not self._failed:
-                _WRITER_LOG.warning("%s: no %s: %s", self.entry, self.entry.type, error)
+                _LOG.warning("%s: no %s: %s", self.entry, self.entry.type, error)
             self._failed = True
             return PortStatus.INVALID_ARGS
         return PortStatus.PORT_OK
@@ -86,8 +84,6 @@ class TopicWriter:
 
 _SMALLEST: Final = 1.2e-38
 """Limit below which a float32 is denormal. No value on a robot is that small."""
-
-_LOG: Final = log_of(__name__)
 
 
 class _Arrivals(Listener):
