@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from omniORB import CORBA
 
@@ -294,18 +294,10 @@ class _OutPortClient:
         return None
 
 
-class _Put(Protocol):
-    def put(self, payload: bytes, /) -> PortStatus: ...
-
-
-class _Get(Protocol):
-    def get(self) -> tuple[PortStatus, bytes | None]: ...
-
-
 class InPortAnswers:
     """The operations of InPortCdr, which put the values of a peer into a local InPort."""
 
-    def __init__(self, connector: _Put) -> None:
+    def __init__(self, connector: peer_ports.InPortPushConnector[Any, bytes]) -> None:
         self._put, self._theirs = connector.put, _theirs()
 
     def put(self, data: bytes) -> Any:
@@ -316,7 +308,7 @@ class InPortAnswers:
 class _OutPortAnswers:
     """The operations of OutPortCdr, executed by a connector."""
 
-    def __init__(self, connector: _Get) -> None:
+    def __init__(self, connector: peer_ports.OutPortPullConnector[Any, bytes]) -> None:
         self._get, self._theirs = connector.get, _theirs()
 
     def get(self) -> tuple[Any, bytes]:
