@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, Final
 
 from omniORB import CORBA
@@ -419,8 +420,9 @@ class ServiceEnd(ConnectorEnd):
         found: dict[str, str] = {}
         for provider in self._port.providers:
             if (operations := _OPERATIONS.get(provider.profile.type_name)) is not None:
-                answers = _Answers(provider.servant, operations, self._place.calls)
-                ior = self.serve(provider.profile.type_name, answers)
+                servant, call = provider.servant, self._place.calls.call
+                answers = {name: partial(call, getattr(servant, name)) for name in operations}
+                ior = self.serve(provider.profile.type_name, SimpleNamespace(**answers))
                 found[self._name("provided", provider.profile)] = ior
                 found[_old_name(provider.profile)] = ior
         return found
@@ -444,8 +446,12 @@ class ServiceEnd(ConnectorEnd):
         return connect(self._port, peer, values, **names)
 
     def _calls(self, reference: Reference, wanted: InterfaceProfile) -> object:
+        """Return an object whose operations call the peer in its thread."""
         watch = peer_ports.PeerWatch(f"{self._port.full_name} to {self._place.peer}")
-        return _Calls(reference, _OPERATIONS[wanted.type_name], self.calling_thread(), watch)
+        submit, calls = self.calling_thread().submit, SimpleNamespace()
+        for name in _OPERATIONS[wanted.type_name]:
+            setattr(calls, name, partial(submit, partial(_call, getattr(reference, name), watch)))
+        return calls
 
     def _ior(self, wanted: InterfaceProfile, values: dict[str, str]) -> str:
         """Return the reference for an interface that the local port requires, empty without one."""
@@ -464,29 +470,6 @@ class ServiceEnd(ConnectorEnd):
     def _name(self, polarity: str, interface: InterfaceProfile) -> str:
         port, kind = self._port, f"{interface.type_name}.{interface.instance_name}"
         return f"{port.owner}.port.{port.name}.{polarity}.{kind}"
-
-
-class _Answers:
-    """Operations that are executed in the manager's thread."""
-
-    def __init__(self, servant: object, operations: tuple[str, ...], calls: CallQueue) -> None:
-        for name in operations:
-            setattr(self, name, partial(calls.call, getattr(servant, name)))
-
-
-class _Calls:
-    """Operations that become calls to a peer, made in the thread of the peer."""
-
-    def __init__(
-        self,
-        reference: Reference,
-        operations: tuple[str, ...],
-        thread: PeerThread,
-        watch: peer_ports.PeerWatch,
-    ) -> None:
-        for name in operations:
-            call = partial(_call, getattr(reference, name), watch)
-            setattr(self, name, partial(thread.submit, call))
 
 
 def _call(operation: Callable[[], None], watch: peer_ports.PeerWatch) -> None:
