@@ -106,27 +106,34 @@ class _WatchedDistance:
     """A distance with hysteresis. The lane is blocked below one value, and free above another.
 
     Args:
-        port: port at which distances arrive.
+        component: component that gets the port `distance` and the parameters.
+        stop_m: default of `stop_distance`.
+        go_m: default of `go_distance`.
 
     Attributes:
         free: whether the lane is free, or False before the first distance.
     """
 
-    def __init__(self, port: InPort[TimedDouble]) -> None:
-        self._port, self.free, self._received_us = port, False, 0
+    def __init__(self, component: RtComponent, stop_m: float, go_m: float) -> None:
+        bind = component.configuration.bind
+        self._stop = bind("stop_distance", stop_m, "x>=0", unit="m")
+        self._go = bind("go_distance", go_m, "x>=0", unit="m")
+        self._timeout = bind("timeout", 0.5, "x>0", unit="s")
+        self._port = component.add_port(InPort("distance", TimedDouble))
+        self.free, self._received_us = False, 0
 
     def forget(self) -> None:
         """Forget the last distance. The lane then counts as blocked."""
         self._port.clear()
         self.free, self._received_us = False, 0
 
-    def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
+    def update(self, ec: ExecutionContext) -> bool:
         """Read the newest distance. Return whether the lane is free."""
         latest = read_newest(self._port)
         if latest is not None and plausible(latest.data):
             self._received_us = ec.now_us
-            self.free = latest.data > (stop_m if self.free else go_m)
-        elif ec.now_us - self._received_us > timeout_s * 1e6:
+            self.free = latest.data > (self._stop if self.free else self._go).value
+        elif ec.now_us - self._received_us > self._timeout.value * 1e6:
             self.free = False
         return self.free
 
@@ -145,15 +152,10 @@ class ObstaclesAvoidance(RtComponent):
 
     def __init__(self, instance_name: str) -> None:
         super().__init__(instance_name)
-        bind = self.configuration.bind
-        self.stop_distance = bind("stop_distance", 0.5, "x>=0", unit="m")
-        self.go_distance = bind("go_distance", 0.7, "x>=0", unit="m")
-        self.timeout = bind("timeout", 0.5, "x>0", unit="s")
-        self.max_acc_v = bind("max_acc_v", 0.3, "x>0", unit="m/s2")
         self.arriving = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
-        self.distance = self.add_port(InPort("distance", TimedDouble))
+        self._watched = _WatchedDistance(self, 0.5, 0.7)
+        self.max_acc_v = self.configuration.bind("max_acc_v", 0.3, "x>0", unit="m/s2")
         self.leaving = self.add_port(OutPort("OutTargetVelocity", iis.TimedVelocity2D))
-        self._watched = _WatchedDistance(self.distance)
         self._before = Twist()
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -164,14 +166,10 @@ class ObstaclesAvoidance(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Write the received velocity, or standstill for forward motion in a blocked lane."""
-        free = self._watched.update(
-            ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
-        )
+        free = self._watched.update(ec)
         if (latest := read_newest(self.arriving)) is not None:
-            data = latest.data
-            self._pass(
-                ec, Twist(data.vx, data.va) if plausible(data.vx, data.va) else Twist(), free
-            )
+            v, w = latest.data.vx, latest.data.va
+            self._pass(ec, Twist(v, w) if plausible(v, w) else Twist(), free)
         return ReturnCode.RTC_OK
 
     def _pass(self, ec: ExecutionContext, wanted: Twist, free: bool) -> None:
@@ -195,14 +193,9 @@ class CollisionDetection(RtComponent):
 
     def __init__(self, instance_name: str) -> None:
         super().__init__(instance_name)
-        bind = self.configuration.bind
-        self.stop_distance = bind("stop_distance", 0.15, "x>=0", unit="m")
-        self.go_distance = bind("go_distance", 0.25, "x>=0", unit="m")
-        self.timeout = bind("timeout", 0.5, "x>0", unit="s")
-        self.distance = self.add_port(InPort("distance", TimedDouble))
+        self._watched = _WatchedDistance(self, 0.15, 0.25)
         port = self.add_port(ServicePort("BumpRefHard"))
         self.ref_hard = port.require(Consumer[RefHard]("service", "RefHard"))
-        self._watched = _WatchedDistance(self.distance)
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -218,9 +211,7 @@ class CollisionDetection(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Evaluate the distance, and call Stop or Go."""
-        free = self._watched.update(
-            ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
-        )
+        free = self._watched.update(ec)
         if free == self._stopped:
             self._call(stop=not free)
         return ReturnCode.RTC_OK
