@@ -7,7 +7,7 @@ from typing import Final, Protocol
 
 from tickrig.host.rtc.motion.chain import MotionChain
 from tickrig.host.rtc.motion.components.omni_to_2wd import plan
-from tickrig.host.rtc.motion.control_laws import VelocityLimits, steps
+from tickrig.host.rtc.motion.control_laws import VelocityLimits
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.motion_run import MotionRun, TrackSample, least_time_s
 from tickrig.host.rtc.motion.ports import RunMode
@@ -142,11 +142,4 @@ def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: VelocityL
 
 def limits_of(chain: MotionChain) -> VelocityLimits:
     """Return the limits that a chain is configured to keep."""
-    follower = chain.path_follower
-    dv, dw = steps(
-        follower.max_acc_v.value,
-        follower.max_acc_w.value,
-        PERIOD_US / 1e6,
-        follower.acc_cycle.value,
-    )
-    return VelocityLimits(follower.max_v.value, follower.max_w.value, dv, dw)
+    return chain.path_follower.limits(PERIOD_US)

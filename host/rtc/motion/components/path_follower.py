@@ -112,13 +112,14 @@ class PathFollower(RtComponent):
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
             self.path = path if plausible(*numbers) else Path(RunMode.STOP)
         wanted = self._wanted(self._update_pose(ec))
-        self.twist = self._limits(ec).smooth(wanted, self.twist)
+        self.twist = self.limits(ec.period_us).smooth(wanted, self.twist)
         write_velocity(self.velocity, ec, self.twist.v, 0.0, self.twist.w)
         return ReturnCode.RTC_OK
 
-    def _limits(self, ec: ExecutionContext) -> control_laws.VelocityLimits:
+    def limits(self, period_us: int) -> control_laws.VelocityLimits:
+        """Return the limits for commands that follow each other after a period."""
         dv, dw = control_laws.steps(
-            self.max_acc_v.value, self.max_acc_w.value, ec.period_us / 1e6, self.acc_cycle.value
+            self.max_acc_v.value, self.max_acc_w.value, period_us / 1e6, self.acc_cycle.value
         )
         return control_laws.VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
