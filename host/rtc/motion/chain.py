@@ -85,7 +85,8 @@ class MotionChain:
     @property
     def in_error(self) -> tuple[str, ...]:
         """Names of the components in Error."""
-        return self._in(LifeCycleState.ERROR)
+        state_of, error = self.context.state_of, LifeCycleState.ERROR
+        return tuple(c.instance_name for c in self.components if state_of(c) is error)
 
     def use(self, set_id: str) -> None:
         """Activate a configuration set, given by its ID, in all components that have it."""
@@ -104,10 +105,6 @@ class MotionChain:
         """
         for component in self.components:
             self.context.deactivate_component(component)
-
-    def _in(self, state: LifeCycleState) -> tuple[str, ...]:
-        state_of = self.context.state_of
-        return tuple(c.instance_name for c in self.components if state_of(c) is state)
 
     def _named(self, port: str) -> str:
         component, _, name = port.partition(".")

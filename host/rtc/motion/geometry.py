@@ -29,6 +29,10 @@ class Pose(NamedTuple):
         """Return the heading towards a point."""
         return atan2(point.y - self.y, point.x - self.x)
 
+    def turn_to(self, pose: Pose) -> float:
+        """Return the angle between the headings of two poses, without its sign."""
+        return abs(wrap(pose.heading - self.heading))
+
 
 class Twist(NamedTuple):
     """A velocity, forward and to the left in m/s, and turning in rad/s."""

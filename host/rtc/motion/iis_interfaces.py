@@ -346,13 +346,13 @@ class PathInterface(RtComponent):
             self._next(now, pose)
         match self._stage:
             case _PathStage.TURN:
-                if _off(self._line, pose) < self.turn_angle.value:
+                if pose.turn_to(self._line) < self.turn_angle.value:
                     self._stage = _PathStage.LINE
                     self._drive(now, pose)
             case _PathStage.LINE:
                 self._drive(now, pose)
             case _PathStage.LAST_TURN:
-                if _off(self._line, pose) < self.goal_angle.value:
+                if pose.turn_to(self._line) < self.goal_angle.value:
                     self._finish(now)
             case _PathStage.IDLE:
                 pass
@@ -406,7 +406,3 @@ class PathInterface(RtComponent):
     def _report(self, now: Time, point: Pose, flag: int) -> None:
         data = ports.to_pose_2d(point._replace(heading=positive(point.heading)))
         self.running_state.write(iis.TimedPose2D(now, (flag,), data))
-
-
-def _off(line: Pose, pose: Pose) -> float:
-    return abs(wrap(line.heading - pose.heading))

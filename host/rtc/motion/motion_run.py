@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.graph.plot import DOTS_X, DOTS_Y, Canvas
 from tickrig.host.rtc.motion.control_laws import VelocityLimits
-from tickrig.host.rtc.motion.geometry import Pose, Twist, wrap
+from tickrig.host.rtc.motion.geometry import Pose, Twist
 
 _LONG_M: Final = 1.0
 """Length in m from which a leg is judged by its cross-track error."""
@@ -74,7 +74,7 @@ class MotionRun:
     @property
     def heading_error_rad(self) -> float:
         """Deviation of the last heading from the heading of the goal, without sign."""
-        return abs(wrap(self.end.heading - self.goal.heading))
+        return self.end.turn_to(self.goal)
 
     @property
     def turning_rad_s(self) -> float:
@@ -142,7 +142,7 @@ def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> 
     limits = limits or MotionLimits()
     return fsum(
         way_time_s(here.distance(there), limits.v, limits.acceleration)
-        + way_time_s(abs(wrap(there.heading - here.heading)), limits.w, limits.angular_acceleration)
+        + way_time_s(here.turn_to(there), limits.w, limits.angular_acceleration)
         for here, there in pairwise(relays)
     )
 

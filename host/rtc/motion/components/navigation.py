@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion import ports
-from tickrig.host.rtc.motion.geometry import Pose, wrap
+from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Path, Time, TimedState
 
@@ -100,10 +100,10 @@ class Navigation(RtComponent):
             case _State.ANGLE_CHECK:
                 self._check_angle(now, relay, pose)
             case _State.TURNING:
-                if _off(relay, pose) < self.turn_angle.value:
+                if pose.turn_to(relay) < self.turn_angle.value:
                     self.state = _State.GOAL_CHECK
             case _State.TURNING2:
-                if _off(relay, pose) < self.goal_angle.value:
+                if pose.turn_to(relay) < self.goal_angle.value:
                     self._stop(now)
                     self.state, self._relays = _State.FINISH, ()
             case _State.GOAL_CHECK:
@@ -113,7 +113,7 @@ class Navigation(RtComponent):
 
     def _check_angle(self, now: Time, relay: Pose, pose: Pose) -> None:
         last = self._at == len(self._relays) - 1
-        if last or _off(relay, pose) > self.align_angle.value:
+        if last or pose.turn_to(relay) > self.align_angle.value:
             self._send(now, ports.RunMode.SPIN, relay, w=1.0)
             self.state = _State.TURNING2 if last else _State.TURNING
         else:
@@ -163,7 +163,3 @@ class Navigation(RtComponent):
     ) -> None:
         self._v = v
         self.path.write(Path(mode, 0, relay.x, relay.y, relay.heading, v, w, tm=now))
-
-
-def _off(relay: Pose, pose: Pose) -> float:
-    return abs(wrap(relay.heading - pose.heading))

@@ -48,12 +48,9 @@ class PositionInput(RtComponent):
     def __init__(self, instance_name: str) -> None:
         super().__init__(instance_name)
         bind = self.configuration.bind
-        for name, default, unit in (
-            ("01_x", 3.4, "m"),
-            ("01_y", 7.7, "m"),
-            ("01_th", -1.57, "rad"),
-        ):
-            bind(name, default, unit=unit)
+        bind("01_x", 3.4, unit="m")
+        bind("01_y", 7.7, unit="m")
+        bind("01_th", -1.57, unit="rad")
         self.status = self.add_port(InPort("status", TimedState))
         self.position = self.add_port(OutPort("position", iis.TimedPose2D))
         self._commands: deque[tuple[iis.TimedPose2D, ...]] = deque()

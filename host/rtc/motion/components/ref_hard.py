@@ -105,9 +105,9 @@ class RefHardRh3(RtComponent):
         self._bind()
         self.velocity = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
         self.angles = self.add_port(OutPort("OutWheelAngle", TimedDoubleSeq))
-        for port_name, service in (("InventGUIRefHard", "service"), ("BumpRefHard", "service")):
+        for port_name in ("InventGUIRefHard", "BumpRefHard"):
             port = self.add_port(ServicePort(port_name))
-            port.provide(Provider[RefHard](service, "RefHard", self))
+            port.provide(Provider[RefHard]("service", "RefHard", self))
         self._counts, self._angles = (0, 0), [0.0, 0.0]
         self.error_reason = ""
         self._forget()
