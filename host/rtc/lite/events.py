@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
@@ -44,6 +44,16 @@ class PingStatistics:
         """Mean round trip, or 0 without a round trip."""
         return self.total_us // self.answered if self.answered else 0
 
+    def with_answer(self, round_trip_us: int) -> PingStatistics:
+        """Return the statistics with one more answer."""
+        return replace(
+            self,
+            answered=self.answered + 1,
+            shortest_us=min(self.shortest_us if self.answered else NEVER, round_trip_us),
+            longest_us=max(self.longest_us, round_trip_us),
+            total_us=self.total_us + round_trip_us,
+        )
+
     def __str__(self) -> str:
         """Return the statistics as text for the user.
 
@@ -75,6 +85,7 @@ class PingMonitor:
         awaiting: whether a PING waits for its answer.
         doubted: whether a reply is missing, and no PING has been answered since that reply was due.
         lost: whether the device no longer answers, which is final.
+        statistics: statistics of the PINGs up to now.
     """
 
     period_us: int
@@ -83,28 +94,11 @@ class PingMonitor:
     awaiting: bool = field(default=False, init=False)
     doubted: bool = field(default=False, init=False)
     lost: bool = field(default=False, init=False)
+    statistics: PingStatistics = field(default=PingStatistics(), init=False)
     _next_us: int = field(default=NEVER, init=False)
     _number: int = field(default=0, init=False)
     _unanswered: int = field(default=0, init=False)
     _pinged_us: int = field(default=0, init=False)
-    _sent: int = field(default=0, init=False)
-    _missed: int = field(default=0, init=False)
-    _answered: int = field(default=0, init=False)
-    _total_us: int = field(default=0, init=False)
-    _shortest_us: int = field(default=0, init=False)
-    _longest_us: int = field(default=0, init=False)
-
-    @property
-    def statistics(self) -> PingStatistics:
-        """Statistics of the PINGs up to now."""
-        return PingStatistics(
-            self._sent,
-            self._answered,
-            self._missed,
-            self._shortest_us,
-            self._longest_us,
-            self._total_us,
-        )
 
     @property
     def due_us(self) -> int:
@@ -128,7 +122,7 @@ class PingMonitor:
             return None
         if self.awaiting:
             self.doubted, self.awaiting = True, False
-            self._missed += 1
+            self._count_missed()
         self.lost = self._unanswered >= self.most
         return None if self.lost else self._ping(now_us)
 
@@ -141,7 +135,7 @@ class PingMonitor:
         """Stop waiting for a routine PING, because a reply to a request proves the same."""
         if self.pending:
             self.awaiting = False
-            self._missed += 1
+            self._count_missed()
 
     def replied(self) -> None:
         """Record that the device has replied to a request, so that it is present."""
@@ -151,12 +145,7 @@ class PingMonitor:
     def answered(self, number: int, now_us: int) -> None:
         """Process an answer. An answer to an older PING is ignored."""
         if self.awaiting and number == self._number:
-            round_trip_us = now_us - self._pinged_us
-            first = not self._answered
-            self._shortest_us = round_trip_us if first else min(self._shortest_us, round_trip_us)
-            self._longest_us = max(self._longest_us, round_trip_us)
-            self._total_us += round_trip_us
-            self._answered += 1
+            self.statistics = self.statistics.with_answer(now_us - self._pinged_us)
             if self.doubted:
                 self._advance(now_us)
             self.awaiting = self.doubted = False
@@ -167,9 +156,12 @@ class PingMonitor:
         self._advance(now_us)
         self._number = self._number % _SEQUENCE[-1] + 1
         self._unanswered += 1
-        self._sent += 1
+        self.statistics = replace(self.statistics, sent=self.statistics.sent + 1)
         self.awaiting, self._pinged_us = True, now_us
         return self._number
+
+    def _count_missed(self) -> None:
+        self.statistics = replace(self.statistics, lost=self.statistics.lost + 1)
 
     def _advance(self, now_us: int) -> None:
         """Skip the PINGs that have fallen due."""
