@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
-from tickrig.host.rtc.component import guarded
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 
@@ -217,10 +216,5 @@ ProxyListener = Callable[[ProxyEvent], None]
 def notify(listener: ProxyListener | None, event: ProxyEvent) -> None:
     """Log an event, and call the listener."""
     _LOG.info("%s", event)
-
-    def listen() -> ReturnCode:
-        if listener is not None:
-            listener(event)
-        return ReturnCode.RTC_OK
-
-    guarded(event.instance_name, listen)
+    if listener is not None:
+        call_listeners(event.instance_name, (listener,), event)
