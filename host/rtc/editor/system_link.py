@@ -10,6 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,13 +34,6 @@ class _Answer:
     refused: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class _Request:
-    do: str
-    fields: Object
-    then: Callable[[Object], str]
-
-
 class SystemLink:
     """A link to a running system. Its own thread reads the state and sends requests.
 
@@ -58,7 +52,7 @@ class SystemLink:
         self.components: list[Any] = []
         self.problem = ""
         self._answers = deque[_Answer]()
-        self._requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._client: ControlClient | None = None
         self._thread = threading.Thread(target=self._run, name="system", daemon=True)
 
@@ -73,7 +67,7 @@ class SystemLink:
                 show.
             fields: fields of the request.
         """
-        self._requests.put(_Request(do, fields, then or (lambda answer: "")))
+        self._requests.put(partial(self._make, do, fields, then or (lambda answer: "")))
 
     def take_answers(self) -> list[_Answer]:
         """Return the results of requests since the last call."""
@@ -89,7 +83,7 @@ class SystemLink:
         """
         while not self._requests.empty():
             if (request := self._requests.get()) is not None:
-                self._make(request)
+                request()
         answer = self._request("describe")
         if isinstance(answer, str):
             self.problem = answer
@@ -114,15 +108,15 @@ class SystemLink:
             if request is None:
                 self._hang_up()
                 return
-            self._make(request)
+            request()
 
-    def _make(self, request: _Request) -> None:
-        answer = self._request(request.do, **request.fields)
+    def _make(self, do: str, fields: Object, then: Callable[[Object], str]) -> None:
+        answer = self._request(do, **fields)
         if isinstance(answer, str):
             self._answers.append(_Answer(answer, refused=True))
             return
         try:
-            text = request.then(answer)
+            text = then(answer)
         except (OSError, ValueError) as error:
             self._answers.append(_Answer(str(error), refused=True))
         else:
