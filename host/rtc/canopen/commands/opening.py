@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, Final
 
 import click
 
@@ -25,7 +25,7 @@ from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.echo import free_of_echo
 from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.host.rtc.canopen.definition import BusEntry
-from tickrig.host.rtc.canopen.events import EventListener, ServerEvent
+from tickrig.host.rtc.canopen.events import EventListener
 from tickrig.host.rtc.canopen.offline import check_offline, draw_graph
 from tickrig.host.rtc.canopen.serve import ServerRunner, open_server
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
@@ -173,11 +173,7 @@ def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
             file = stack.enter_context(log.open("w", encoding="utf-8", buffering=1))
         except OSError as error:
             refuse_path("--log", error)
-        yield lambda event: _write(file, event)
-
-
-def _write(file: TextIO, event: ServerEvent) -> None:
-    file.write(f"{event.to_json()}\n")
+        yield lambda event: click.echo(event.to_json(), file=file)
 
 
 def _close(link: CanLink) -> None:
