@@ -13,6 +13,7 @@ from tickrig.host.rtc.canopen import pdo_layout
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry
 from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 from tickrig.wire import rtc_canopen
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -360,21 +361,17 @@ class ProxyRtc(RtComponent):
         fit = [(layout, name) for layout, name in named if layout.fields and not layout.unknown]
         self.sources = tuple(PdoSource(layout, name) for layout, name in fit if layout.sends)
         self.sinks = tuple(PdoSink(layout, name) for layout, name in fit if not layout.sends)
-        for source in self.sources:
-            for out in source.ports:
-                self.add_port(out)
-        for sink in self.sinks:
-            for in_ in sink.ports:
-                self.add_port(in_)
         outs = [
             layout for layout in sdo_layouts if layout.direction is rtc_canopen.PortDirection.OUT
         ]
         self.sdo_sources = tuple(map(SdoSource, outs))
         self.sdo_sinks = tuple(SdoSink(layout) for layout in sdo_layouts if layout not in outs)
-        for read in self.sdo_sources:
-            self.add_port(read.port)
-        for written in self.sdo_sinks:
-            self.add_port(written.port)
+        ports: list[AnyPort] = [port for source in self.sources for port in source.ports]
+        ports += (port for sink in self.sinks for port in sink.ports)
+        ports += (source.port for source in self.sdo_sources)
+        ports += (sink.port for sink in self.sdo_sinks)
+        for port in ports:
+            self.add_port(port)
 
     @property
     def state(self) -> LifeCycleState:
