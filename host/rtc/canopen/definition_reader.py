@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
+from enum import Enum
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -65,11 +66,6 @@ def _children(node: Item, place: str) -> dict[str, tuple[FilePlace, Item]]:
         if isinstance(key, bool) or not isinstance(key, str | int):
             _refuse(node.keys[key], f"{place}: YAML reads a key as {key}; put it into quotes")
     return {str(key): (node.keys[key], value) for key, value in node.fields.items()}
-
-
-def table(fields: Mapping[str, _Reader], *needed: str) -> _Reader:
-    """Read a mapping whose keys are known."""
-    return lambda node, place: _read_table(node, place, fields, needed)
 
 
 def mapping(key: Callable[[Item, str], str], value: _Reader) -> _Reader:
@@ -174,6 +170,12 @@ def _one_of(*words: str) -> _Reader:
         return value
 
     return read
+
+
+def _member_of(kind: type[Enum]) -> _Reader:
+    """Read a member of an enumeration by its value."""
+    word = _one_of(*(item.value for item in kind))
+    return lambda node, place: kind(word(node, place))
 
 
 def plain(node: Item) -> Any:
@@ -287,7 +289,7 @@ def _node(node: Item, place: str) -> definition.NodeEntry:
         "id": _NODE_ID,
         "name": _matching(_NAME, "Palette0"),
         "eds": text,
-        "role": _one_of(*definition.Role),
+        "role": _member_of(definition.Role),
         "heartbeat_ms": whole(1, 0xFFFF),
         "restart": _U16,
         "ports": _ports,
@@ -295,8 +297,6 @@ def _node(node: Item, place: str) -> definition.NodeEntry:
         "sdo_ports": mapping(_matching(_NAME, "label"), _sdo_port),
     }
     values = _read_table(node, place, fields, ("id", "name", "eds"))
-    if "role" in values:
-        values["role"] = definition.Role(values["role"])
     for name in values.get("sdo_ports", ()):
         if name in values.get("ports", {}).values():
             _refuse(node, f"{place}: 2 ports are called {name}")
@@ -338,11 +338,10 @@ def _cob_id(node: Item, place: str) -> int:
 def _sdo_port(node: Item, place: str) -> definition.SdoPortEntry:
     fields: dict[str, _Reader] = {
         "index": whole(0x1000, 0xFFFF),
-        "direction": _one_of(*(item.value for item in PortDirection)),
+        "direction": _member_of(PortDirection),
         "type": _one_of(*PORT_TYPES),
     }
-    values = _read_table(node, place, fields, ("index", "direction"))
-    return definition.SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
+    return definition.SdoPortEntry(**_read_table(node, place, fields, ("index", "direction")))
 
 
 def _mapping(node: Item, place: str) -> tuple[MappedObject, ...]:
@@ -403,7 +402,8 @@ def _start(node: Item, place: str, ids: Collection[int]) -> definition.StartEntr
         return node_id
 
     order = once(known, lambda node_id: f"node {node_id} is there")
-    return definition.StartEntry(**table({"order": order, "autoactivate": _flag})(node, place))
+    fields: dict[str, _Reader] = {"order": order, "autoactivate": _flag}
+    return definition.StartEntry(**_read_table(node, place, fields))
 
 
 def _check_number(node: Item, place: str, pdo: str) -> None:

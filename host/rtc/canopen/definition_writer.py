@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, Field, fields, replace
+from dataclasses import MISSING, Field, asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -136,8 +136,7 @@ def _sdo_port(entry: SdoPortEntry) -> _Table:
 
 
 def _sdo(entry: SdoEntry) -> _Table:
-    values = {item.name: getattr(entry, item.name) for item in fields(entry)}
-    return {**values, "index": _Hex(entry.index)}
+    return {**asdict(entry), "index": _Hex(entry.index)}
 
 
 def _link(link: PdoLink) -> _Table:

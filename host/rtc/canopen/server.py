@@ -257,7 +257,6 @@ class RtcCanopenServer:
     Args:
         definition: System Definition to serve.
         files: content of the EDS files by name in the definition.
-        manager: manager of the proxies and all other components. By default, it is a new manager.
 
     Attributes:
         manager: manager of the proxies and all other components.
@@ -270,13 +269,8 @@ class RtcCanopenServer:
         due_us: time of the next call of `tick`.
     """
 
-    def __init__(
-        self,
-        definition: SystemDefinition,
-        files: Mapping[str, DeviceFile],
-        manager: Manager | None = None,
-    ) -> None:
-        self.definition, self.manager = definition, manager or Manager()
+    def __init__(self, definition: SystemDefinition, files: Mapping[str, DeviceFile]) -> None:
+        self.definition, self.manager = definition, Manager()
         self.findings = tuple(odd for file in files.values() for odd in file.findings)
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
