@@ -98,10 +98,6 @@ _DEFAULT_WORD_BITS: Final = 32
 _DEFAULT_NODE_ID: Final = 16
 
 
-class _ProfileError(ValueError):
-    """A profile that cannot be used. The message is one line with place and reason."""
-
-
 @dataclass(frozen=True, slots=True)
 class Project:
     """The content of a profile file, from which the builder makes a component.
@@ -121,34 +117,31 @@ def parse_project(text: str) -> Project:
     """Read a profile.
 
     Raises:
-        _ProfileError: the file is not TOML, a key is unknown, a value has the wrong type, or no
+        ValueError: the file is not TOML, a key is unknown, a value has the wrong type, or no
             DeviceRTC can have this profile.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
 
-    try:
-        content = load_toml(text)
-        _check_keys(content, _KEYS)
-        ports = _tables(content)
-        word_bits = _take(content, "word_bits", int, _DEFAULT_WORD_BITS)
-        profile = RtcProfile(
-            type_name=_take(content, "name", str),
-            **{key: _take(content, key, str) for key in _TEXTS if key in content},
-            **{key: _take(content, key, int) for key in _NUMBERS if key in content},
-            ports=tuple(_port(number, table, word_bits) for number, table in enumerate(ports, 1)),
-        )
-        node_id = _take(content, "node_id", int, _DEFAULT_NODE_ID)
-        if not 1 <= node_id <= 127:
-            raise _ProfileError(f"node_id {node_id} is not in 1..127")
-        return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
-    except ValueError as error:
-        raise _ProfileError(str(error)) from None
+    content = load_toml(text)
+    _check_keys(content, _KEYS)
+    ports = _tables(content)
+    word_bits = _take(content, "word_bits", int, _DEFAULT_WORD_BITS)
+    profile = RtcProfile(
+        type_name=_take(content, "name", str),
+        **{key: _take(content, key, str) for key in _TEXTS if key in content},
+        **{key: _take(content, key, int) for key in _NUMBERS if key in content},
+        ports=tuple(_port(number, table, word_bits) for number, table in enumerate(ports, 1)),
+    )
+    node_id = _take(content, "node_id", int, _DEFAULT_NODE_ID)
+    if not 1 <= node_id <= 127:
+        raise ValueError(f"node_id {node_id} is not in 1..127")
+    return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
 
 
 def _tables(content: _Table) -> list[_Table]:
     tables = content.get("port", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise _ProfileError("port: ports are tables [[port]]")
+        raise ValueError("port: ports are tables [[port]]")
     return tables
 
 
@@ -165,14 +158,14 @@ def _port(number: int, table: _Table, word_bits: int) -> CanopenPortProfile:
             _member(table, "transport", PortTransport) if "transport" in table else None,
         )
     except ValueError as error:
-        raise _ProfileError(f"port {number}: {error}") from None
+        raise ValueError(f"port {number}: {error}") from None
 
 
 def _member(table: _Table, key: str, kind: type[_E]) -> _E:
     """Return a member of an enumeration by its value."""
     value, known = _take(table, key, str), [str(item.value) for item in kind]
     if value not in known:
-        raise _ProfileError(f"{key} {value!r} is not one of {', '.join(known)}")
+        raise ValueError(f"{key} {value!r} is not one of {', '.join(known)}")
     return kind(value)
 
 
@@ -181,20 +174,20 @@ def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:
         integer(word_bits) if name == INTEGER else PORT_TYPES.get(name)
     )
     if element is None:
-        raise _ProfileError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")
+        raise ValueError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")
     return element if length == 1 else element.sequence(length)
 
 
 def _check_keys(table: _Table, known: tuple[str, ...]) -> None:
     for key in table:
         if key not in known:
-            raise _ProfileError(f"no key {key}; known: {', '.join(known)}")
+            raise ValueError(f"no key {key}; known: {', '.join(known)}")
 
 
 def _take(table: _Table, key: str, kind: type[Any], default: Any = None) -> Any:
     value = table.get(key, default)
     if value is None:
-        raise _ProfileError(f"{key} is missing")
+        raise ValueError(f"{key} is missing")
     if type(value) is not kind:
-        raise _ProfileError(f"{key} {value!r} is {_KINDS[kind]}")
+        raise ValueError(f"{key} {value!r} is {_KINDS[kind]}")
     return value
