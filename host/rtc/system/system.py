@@ -86,8 +86,8 @@ def describe(manager: Manager) -> System:
     return System(
         tuple(_entry(component, shared) for component in manager.components),
         (
-            *(_connection(profile) for profile in manager.connectors),
-            *(_remote_connection(one) for one in manager.remotes.connections),
+            *map(_connection, manager.connectors),
+            *map(_connection, manager.remotes.connections),
         ),
         tuple(manager.remotes.components),
     )
@@ -142,9 +142,9 @@ def _entry(component: RtComponent, shared: dict[int, str]) -> ComponentEntry:
     )
 
 
-def _connection(profile: ConnectorProfile) -> ConnectionEntry:
-    ports, given = profile.ports, given_id(profile.connector_id, profile.ports)
-    return ConnectionEntry(ports, profile.name, dict(profile.properties), given)
+def _connection(one: ConnectorProfile | RemoteConnection) -> ConnectionEntry:
+    given = given_id(one.connector_id, one.ports)
+    return ConnectionEntry(one.ports, one.name, dict(one.properties), given)
 
 
 def given_id(connector_id: str, ports: tuple[str, str]) -> str:
@@ -206,11 +206,6 @@ def _remote(
 
 def _owner(port: str) -> str:
     return port.rpartition(".")[0]
-
-
-def _remote_connection(one: RemoteConnection) -> ConnectionEntry:
-    given = given_id(one.connector_id, one.ports)
-    return ConnectionEntry(one.ports, one.name, dict(one.properties), given)
 
 
 def _context(
