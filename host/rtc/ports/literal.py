@@ -121,8 +121,7 @@ def _enumerator(kind: type[IntEnum], given: object, place: str) -> IntEnum:
 
 
 def _refused(place: str, wanted: str, given: object) -> RtcRefused:
-    text = json.dumps(given)
-    return RtcRefused(f"{place} takes {wanted}, not {text if len(text) <= 60 else text[:60]}")
+    return RtcRefused(f"{place} takes {wanted}, not {json.dumps(given)[:60]}")
 
 
 _LiteralType = tuple[type | tuple[type, ...], str, Callable[[Any], object]]
