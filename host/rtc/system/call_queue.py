@@ -30,13 +30,9 @@ class CallQueue:
 
     A `ServingClock` calls `serve` while it waits. If this thread also serves a control socket,
     `LineServer.attach(queue, queue.make)` serves both.
-
-    Args:
-        timeout_us: longest time that a call waits for that thread, unless its caller sets a time.
     """
 
-    def __init__(self, timeout_us: int = CALL_TIMEOUT_US) -> None:
-        self._timeout_us = timeout_us
+    def __init__(self) -> None:
         self._lock, self._entries, self._closed = threading.Lock(), list[_Entry](), False
         self._owner = threading.get_ident()
         self._reader, self._writer = socket.socketpair()
@@ -46,15 +42,14 @@ class CallQueue:
         """Return a descriptor that can be read while calls wait for `make`, or -1 at the end."""
         return self._reader.fileno()
 
-    def call(self, function: Callable[[], _R], timeout_us: int | None = None) -> _R:
+    def call(self, function: Callable[[], _R], timeout_us: int = CALL_TIMEOUT_US) -> _R:
         """Call a function in the manager's thread, and wait for its result.
 
         If the caller is in that thread, the function is called at once.
 
         Args:
             function: function to call, which must not wait.
-            timeout_us: longest time until the call begins. By default, it is the time-out of the
-                queue.
+            timeout_us: longest time until the call begins.
 
         Returns:
             The result of the function.
@@ -67,7 +62,7 @@ class CallQueue:
         if threading.get_ident() == self._owner:
             return function()
         future: Future[_R] = Future()
-        wait_s = (self._timeout_us if timeout_us is None else timeout_us) / 1e6
+        wait_s = timeout_us / 1e6
         self._enter((future, function))
         try:
             return future.result(wait_s)
