@@ -237,12 +237,9 @@ class SystemScreen(FramedApp):
             self._request("disconnect", ports=[port, peers[0]])
         else:
             rows = [CursorRow(peer, plain(peer), peer) for peer in peers]
-
-            def chosen(peer: str | None) -> None:
-                if peer is not None:
-                    self._request("disconnect", ports=[port, peer])
-
-            self.push_screen(ChoiceScreen(f"disconnect {port} from", rows), chosen)
+            ChoiceScreen(f"disconnect {port} from", rows).prompt(
+                self, lambda peer: self._request("disconnect", ports=[port, peer])
+            )
 
     def action_edit(self) -> None:
         """Ask for the value of the row under the cursor. If the row is a set, activate the set."""
@@ -255,14 +252,11 @@ class SystemScreen(FramedApp):
             self._request("activate_set", name=name, set=set_id)
             return
 
-        def answered(words: str | None) -> None:
-            if words is not None:
-                self._request(
-                    "set_parameter", name=name, parameter=parameter, value=words, set=set_id
-                )
+        def answered(words: str) -> None:
+            self._request("set_parameter", name=name, parameter=parameter, value=words, set=set_id)
 
         where = f" of the set {set_id}" if set_id else ""
-        self.push_screen(QuestionScreen(f"{name}: {parameter}{where}", value), answered)
+        QuestionScreen(f"{name}: {parameter}{where}", value).prompt(self, answered)
 
     def action_add_set(self) -> None:
         """Ask for a name, and make a configuration set like the set under the cursor."""
@@ -274,16 +268,15 @@ class SystemScreen(FramedApp):
         if row is not None and row.item.set_id:
             like = row.item.set_id
 
-        def answered(set_id: str | None) -> None:
-            if set_id is not None:
-                self._request("add_set", name=name, set=set_id.strip(), like=like)
+        def answered(set_id: str) -> None:
+            self._request("add_set", name=name, set=set_id.strip(), like=like)
 
-        self.push_screen(QuestionScreen(f"{name}: new set with the values of {like}", ""), answered)
+        QuestionScreen(f"{name}: new set with the values of {like}", "").prompt(self, answered)
 
     def action_save(self) -> None:
         """Ask for a file, and write the system in its present state."""
 
-        def answered(path: str | None) -> None:
+        def answered(path: str) -> None:
             if not path:
                 return
             try:
@@ -293,9 +286,7 @@ class SystemScreen(FramedApp):
                 return
             self._request("save", _written(Path(path)), format=form)
 
-        self.push_screen(
-            QuestionScreen("save the system as (.toml, .xml)", "system.toml"), answered
-        )
+        QuestionScreen("save the system as (.toml, .xml)", "system.toml").prompt(self, answered)
 
     def _request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object

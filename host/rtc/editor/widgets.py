@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar, Final, Generic, NamedTuple, TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.content import Content
@@ -167,7 +167,26 @@ class CursorView(LineView, Generic[_T]):
         return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)
 
 
-class QuestionScreen(ModalScreen[str | None]):
+class _PromptScreen(ModalScreen[_T | None]):
+    """A screen whose result is the answer of the user, or None without an answer."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
+
+    def prompt(self, app: App[Any], then: Callable[[_T], object]) -> None:
+        """Show the screen, and call a function with the answer, if there is one."""
+
+        def answered(answer: _T | None) -> None:
+            if answer is not None:
+                then(answer)
+
+        app.push_screen(self, answered)
+
+    def action_leave(self) -> None:
+        """Leave without an answer."""
+        self.dismiss(None)
+
+
+class QuestionScreen(_PromptScreen[str]):
     """A screen that asks the user for a line of text. The result is None without an answer.
 
     Args:
@@ -175,7 +194,6 @@ class QuestionScreen(ModalScreen[str | None]):
         answer: initial answer.
     """
 
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
     CSS = """
     QuestionScreen { align: center middle; }
     QuestionScreen Vertical {
@@ -199,12 +217,8 @@ class QuestionScreen(ModalScreen[str | None]):
         """Accept the answer."""
         self.dismiss(event.value)
 
-    def action_leave(self) -> None:
-        """Leave without an answer."""
-        self.dismiss(None)
 
-
-class ChoiceScreen(ModalScreen[_T | None]):
+class ChoiceScreen(_PromptScreen[_T]):
     """A screen that asks the user to choose a row. Only rows with the typed text are shown.
 
     The result is None without an answer.
@@ -215,7 +229,6 @@ class ChoiceScreen(ModalScreen[_T | None]):
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "leave", "leave"),
         Binding("up", "move(-1)", show=False, priority=True),
         Binding("down", "move(1)", show=False, priority=True),
         Binding("pageup", "page(-1)", show=False, priority=True),
@@ -284,7 +297,3 @@ class ChoiceScreen(ModalScreen[_T | None]):
     def action_page(self, pages: int) -> None:
         """Move the cursor by pages of the visible rows."""
         self.choices.action_page(pages)
-
-    def action_leave(self) -> None:
-        """Leave without an answer."""
-        self.dismiss(None)

@@ -14,7 +14,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.rtc.canopen.definition import PdoLink, RtConnection, ServerRefused
+from tickrig.host.rtc.canopen.definition import ServerRefused
 from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc.canopen.editor.pdo_screen import PdoScreen
 from tickrig.host.rtc.canopen.editor.session import EditorSession
@@ -264,12 +264,9 @@ class SystemEditor(FramedApp):
             rows = [
                 CursorRow(text, plain(text), one) for text, one in zip(texts, found, strict=True)
             ]
-
-            def chosen(one: PdoLink | RtConnection | None) -> None:
-                if one is not None:
-                    self._command(lambda view: remove(view, one))
-
-            self.push_screen(ChoiceScreen(f"remove from {row.item.name}", rows), chosen)
+            ChoiceScreen(f"remove from {row.item.name}", rows).prompt(
+                self, lambda one: self._command(lambda view: remove(view, one))
+            )
 
     def action_picture(self) -> None:
         """Show the system as a picture, or as a list."""
@@ -311,13 +308,11 @@ class SystemEditor(FramedApp):
         if objects is None or row is None:
             return
         name = objects.text_of(row.item).name
-
-        def write(words: str | None) -> None:
-            if words is not None:
-                self._command(lambda view: objects.write(view, row.item, words))
-
         question = QuestionScreen(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
-        self.push_screen(question, write)
+        question.prompt(
+            self,
+            lambda words: self._command(lambda view: objects.write(view, row.item, words)),
+        )
 
     def action_save(self) -> None:
         """Ask for a file, and save the definition with the present connections and links."""
@@ -333,11 +328,11 @@ class SystemEditor(FramedApp):
         self.objects.forget()
 
     def _prompt_path(self, text: str, do: Callable[[Path], None]) -> None:
-        def answered(path: str | None) -> None:
+        def answered(path: str) -> None:
             if path and self._try(lambda: do(Path(path))):
                 self.notify(f"{text}: {path}", markup=False)
 
-        self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
+        QuestionScreen(text, str(self.session.path)).prompt(self, answered)
 
     def _command(self, command: _Command) -> bool:
         """Send a command to the server. If the server refuses, show the reason."""

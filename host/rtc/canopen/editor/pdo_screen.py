@@ -335,11 +335,10 @@ class PdoScreen(ModalScreen[None]):
             }
             nodes = view.nodes
 
-        def chosen(other: PdoName | None) -> None:
-            if other is not None:
-                ends = (name, other) if at.index in TPDOS else (other, name)
-                change = ServerView.unlink if other in links else ServerView.link
-                self._command(lambda view: change(view, *ends))
+        def chosen(other: PdoName) -> None:
+            ends = (name, other) if at.index in TPDOS else (other, name)
+            change = ServerView.unlink if other in links else ServerView.link
+            self._command(lambda view: change(view, *ends))
 
         if links and at.index not in TPDOS:  # it has one source
             chosen(next(iter(links)))
@@ -359,7 +358,7 @@ class PdoScreen(ModalScreen[None]):
             if node.node_id != self._node_id and (pdo.index in TPDOS) != (at.index in TPDOS)
         ]
         if rows:
-            self.app.push_screen(ChoiceScreen(f"link {name} with, or cut the link", rows), chosen)
+            ChoiceScreen(f"link {name} with, or cut the link", rows).prompt(self.app, chosen)
         else:
             self._refuse("no other node has a PDO of the other direction that is on")
 
@@ -371,21 +370,21 @@ class PdoScreen(ModalScreen[None]):
             eds = self._session.eds_paths[self._node_id]
         path = eds.with_name(f"{eds.stem}-{self._node_id}.dcf")
 
-        def answered(text: str | None) -> None:
+        def answered(text: str) -> None:
             def read(view: ServerView) -> None:
-                self._saving = view.read_parameters(self._node_id, eds), Path(text or ""), eds
+                self._saving = view.read_parameters(self._node_id, eds), Path(text), eds
 
             if text:
                 self._command(read)
 
-        self.app.push_screen(QuestionScreen("save the node as DCF", str(path)), answered)
+        QuestionScreen("save the node as DCF", str(path)).prompt(self.app, answered)
 
     def action_load(self) -> None:
         """Ask for a DCF, and use its PDOs as changes."""
         if self._is_busy() or self._at() is None or (file := self._file) is None:
             return
 
-        def answered(text: str | None) -> None:
+        def answered(text: str) -> None:
             if not text:
                 return
             try:
@@ -399,7 +398,7 @@ class PdoScreen(ModalScreen[None]):
                 self._note(f"{text}: {counted(len(wanted), 'changed PDO')}: w writes", _CHANGED)
                 self.look()
 
-        self.app.push_screen(QuestionScreen("load the PDOs of a DCF", ""), answered)
+        QuestionScreen("load the PDOs of a DCF", "").prompt(self.app, answered)
 
     def action_leave(self) -> None:
         """Leave the screen. If changes are not written, ask first."""
@@ -443,16 +442,14 @@ class PdoScreen(ModalScreen[None]):
             for one in pdo_edit.mappable(self._file, at.index)
         ]
 
-        def chosen(mapped: MappedObject | None) -> None:
-            if mapped is not None:
-                self._change(
-                    at.index,
-                    lambda pdo: pdo_edit.with_entry(pdo, place, mapped, insert=insert),
-                )
+        def chosen(mapped: MappedObject) -> None:
+            self._change(
+                at.index, lambda pdo: pdo_edit.with_entry(pdo, place, mapped, insert=insert)
+            )
 
         name = pdo_edit.pdo_name(self._node_id, at.index)
         what = f"insert into {name}" if insert else f"entry {place + 1} of {name}"
-        self.app.push_screen(ChoiceScreen(what, rows), chosen)
+        ChoiceScreen(what, rows).prompt(self.app, chosen)
 
     def _prompt(
         self,
@@ -464,12 +461,11 @@ class PdoScreen(ModalScreen[None]):
             return
         pdo = self.wanted.get(at.index, self.pdos[at.index])
 
-        def answered(words: str | None) -> None:
-            if words is not None:
-                self._change(at.index, lambda pdo: change(pdo, words))
+        def answered(words: str) -> None:
+            self._change(at.index, lambda pdo: change(pdo, words))
 
         name = pdo_edit.pdo_name(self._node_id, at.index)
-        self.app.push_screen(QuestionScreen(f"{text} {name}", shown(pdo)), answered)
+        QuestionScreen(f"{text} {name}", shown(pdo)).prompt(self.app, answered)
 
     def _change(self, index: int, change: Callable[[PdoDescription], PdoDescription]) -> None:
         """Change a PDO on this screen. The node gets the change when it is written."""
