@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
-from textual.content import Content
-from textual.events import Blur, Click, Focus, Resize
+from textual.events import Click, Resize
 from textual.message import Message
 
 from tickrig.host.rtc.editor.picture import Picture, draw, neighbour
+from tickrig.host.rtc.editor.widgets import FramedView
 from tickrig.host.rtc.system.dot import Box, Edge
-from tickrig.host.tui import LineView
 
 
-class SystemPicture(LineView):
+class SystemPicture(FramedView):
     """A picture that shows components as boxes and connectors as wires.
 
     Attributes:
@@ -150,24 +149,9 @@ class SystemPicture(LineView):
             if place.line == line and place.column - 1 <= cell <= place.column + place.width:
                 self.go_to(name)
 
-    def on_focus(self, event: Focus) -> None:
-        """Show that the picture has the keyboard focus."""
-        self.paint()
-
-    def on_blur(self, event: Blur) -> None:
-        """Show that the picture does not have the keyboard focus."""
-        self.paint()
-
     def on_resize(self, event: Resize) -> None:
         """Draw the picture for the new width."""
         self.paint()
-
-    def frame(self, title: str, below: str = "") -> None:
-        """Update the frame only after a change, because this paints the whole view again."""
-        if str(self.border_title or "") != title:
-            self.border_title = Content(title)
-        if str(self.border_subtitle or "") != below:
-            self.border_subtitle = Content(below) if below else None
 
 
 def _names(box: Box) -> tuple[str, ...]:

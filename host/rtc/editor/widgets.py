@@ -39,7 +39,30 @@ _MARGIN: Final = 2
 """Number of columns at the left in which a click opens or folds a row."""
 
 
-class CursorView(LineView, Generic[_T]):
+class FramedView(LineView):
+    """A view with titles on its frame, which is painted again with and without the focus."""
+
+    def paint(self) -> None:
+        """Show the content and the cursor."""
+        raise NotImplementedError
+
+    def on_focus(self, event: Focus) -> None:
+        """Show that the view has the keyboard focus."""
+        self.paint()
+
+    def on_blur(self, event: Blur) -> None:
+        """Show that the view does not have the keyboard focus."""
+        self.paint()
+
+    def frame(self, title: str, below: str = "") -> None:
+        """Update the frame only after a change, because this paints the whole view again."""
+        if str(self.border_title or "") != title:
+            self.border_title = Content(title)
+        if str(self.border_subtitle or "") != below:
+            self.border_subtitle = Content(below) if below else None
+
+
+class CursorView(FramedView, Generic[_T]):
     """A list of rows with a cursor. The cursor stays on its item while other rows come and go.
 
     If the row under the cursor is cut off, its end is shown below the rows.
@@ -78,7 +101,7 @@ class CursorView(LineView, Generic[_T]):
         super().__init__(id)
         self.rows_shown: list[CursorRow[_T]] = []
         self.cursor = 0
-        self.title, self._framed = id, ("", "")
+        self.title = id
 
     @property
     def row(self) -> CursorRow[_T] | None:
@@ -108,7 +131,7 @@ class CursorView(LineView, Generic[_T]):
             line = lines[self.cursor]
             cut = line[-1][0].strip() if line_width(line) > self._columns else ""
             lines[self.cursor] = self._under_cursor(line)
-        self._frame(cut)
+        self.frame(self.title, cut)
         self.show(lines)
 
     @property
@@ -145,21 +168,6 @@ class CursorView(LineView, Generic[_T]):
             self.put_cursor(self.top + at.y)
             if at.x < _MARGIN or event.chain == 2:
                 self.action_enter()
-
-    def on_focus(self, event: Focus) -> None:
-        """Show that the view has the keyboard focus."""
-        self.paint()
-
-    def on_blur(self, event: Blur) -> None:
-        """Show that the view does not have the keyboard focus."""
-        self.paint()
-
-    def _frame(self, below: str) -> None:
-        """Update the frame only after a change, because this paints the whole view again."""
-        if (self.title, below) != self._framed:
-            self._framed = self.title, below
-            self.border_title = Content(self.title)
-            self.border_subtitle = Content(below) if below else None
 
     def _under_cursor(self, line: Line) -> Line:
         style = _FOCUSED if self.has_focus else _ELSEWHERE
