@@ -27,23 +27,13 @@ def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     The velocity in the message is the velocity since the previous pose.
     """
     make, speed = _odometry(entry, stamps), _Speed()
-
-    def convert(value: Any) -> Any:
-        forward, turn = speed.since(value.tm, value.data)
-        return make(value.tm, value.data, forward, 0.0, turn)
-
-    return convert
+    return lambda value: make(value.tm, value.data, speed.since(value.tm, value.data))
 
 
 def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a pose with its velocity to an Odometry message."""
     make = _odometry(entry, stamps)
-
-    def convert(value: Any) -> Any:
-        speeds = value.data.velocities
-        return make(value.tm, value.data.pose, speeds.vx, speeds.vy, speeds.va)
-
-    return convert
+    return lambda value: make(value.tm, value.data.pose, value.data.velocities)
 
 
 def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
@@ -85,18 +75,13 @@ def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], An
 def twist_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a velocity in the plane to a Twist message."""
     twist = _twist()
-    return lambda value: twist(value.data.vx, value.data.vy, value.data.va)
+    return lambda value: twist(value.data)
 
 
 def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a velocity in the plane to a TwistStamped message."""
     header, twist, message = _header(entry, stamps), _twist(), message_type(entry.type)
-
-    def convert(value: Any) -> Any:
-        speeds = value.data
-        return message(header(value.tm), twist(speeds.vx, speeds.vy, speeds.va))
-
-    return convert
+    return lambda value: message(header(value.tm), twist(value.data))
 
 
 def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
@@ -164,17 +149,17 @@ class _Speed:
     def __init__(self) -> None:
         self._before: tuple[Time, Pose2D] | None = None
 
-    def since(self, tm: Time, pose: Pose2D) -> tuple[float, float]:
-        """Return the velocity since the previous pose, in m/s ahead and rad/s. The first is 0."""
+    def since(self, tm: Time, pose: Pose2D) -> Velocity2D:
+        """Return the velocity since the previous pose. The first is 0."""
         before, self._before = self._before, (tm, pose)
         if before is None or (past_us := tm.us - before[0].us) <= 0:
-            return 0.0, 0.0
+            return Velocity2D()
         start, turn = before[1], (pose.heading - before[1].heading + pi) % tau - pi
         middle, half = start.heading + turn / 2, turn / 2
         east, north = pose.position.x - start.position.x, pose.position.y - start.position.y
         chord = east * cos(middle) + north * sin(middle)
         way = chord * half / sin(half) if abs(half) > _STRAIGHT else chord
-        return 1e6 * way / past_us, 1e6 * turn / past_us
+        return Velocity2D(1e6 * way / past_us, 0.0, 1e6 * turn / past_us)
 
 
 def _named(entry: TopicEntry, positions: list[float]) -> list[str]:
@@ -205,21 +190,19 @@ def _pose() -> Callable[[Pose2D], Any]:
     return lambda data: pose(point(data.position.x, data.position.y, 0.0), turned(data.heading))
 
 
-def _twist() -> Callable[[float, float, float], Any]:
+def _twist() -> Callable[[Velocity2D], Any]:
     twist, vector = message_type("geometry_msgs/msg/Twist"), _vector()
-    return lambda ahead, left, turn: twist(vector(ahead, left, 0.0), vector(0.0, 0.0, turn))
+    return lambda speeds: twist(vector(speeds.vx, speeds.vy, 0.0), vector(0.0, 0.0, speeds.va))
 
 
 def _odometry(entry: TopicEntry, stamps: Stamps) -> Callable[..., Any]:
     header, pose, twist = _header(entry, stamps), _pose(), _twist()
     placed = message_type("geometry_msgs/msg/PoseWithCovariance")
-    moving, message = (
-        message_type("geometry_msgs/msg/TwistWithCovariance"),
-        message_type(entry.type),
+    moving = message_type("geometry_msgs/msg/TwistWithCovariance")
+    message = message_type(entry.type)
+    return lambda tm, at, speeds: message(
+        header(tm),
+        entry.child_frame,
+        placed(pose(at), _UNKNOWN),
+        moving(twist(speeds), _UNKNOWN),
     )
-
-    def make(tm: Time, data: Pose2D, ahead: float, left: float, turn: float) -> Any:
-        speeds = moving(twist(ahead, left, turn), _UNKNOWN)
-        return message(header(tm), entry.child_frame, placed(pose(data), _UNKNOWN), speeds)
-
-    return make
