@@ -56,20 +56,17 @@ def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     return lambda value: message(header(value.tm), pose(value.data))
 
 
-def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
+def pose_in(data_type: Any, entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a PoseStamped to a pose in the plane, without the tilt."""
 
-    def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-        def convert(message: Any) -> Any:
-            stamp, pose = message.header.stamp, message.pose
-            place, q = pose.position, pose.orientation
-            heading = atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-            tm = stamps.to_system(stamp.sec, stamp.nanosec)
-            return data_type(tm, data=Pose2D(Point2D(place.x, place.y), heading))
+    def convert(message: Any) -> Any:
+        stamp, pose = message.header.stamp, message.pose
+        place, q = pose.position, pose.orientation
+        heading = atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+        tm = stamps.to_system(stamp.sec, stamp.nanosec)
+        return data_type(tm, data=Pose2D(Point2D(place.x, place.y), heading))
 
-        return convert
-
-    return maker
+    return convert
 
 
 def twist_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
@@ -84,20 +81,16 @@ def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]
     return lambda value: message(header(value.tm), twist(value.data))
 
 
-def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
+def twist_in(data_type: Any, entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a Twist or TwistStamped to a velocity in the plane."""
+    stamped = entry.type.endswith("Stamped")
 
-    def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-        stamped = entry.type.endswith("Stamped")
+    def convert(message: Any) -> Any:
+        twist = message.twist if stamped else message
+        speeds = Velocity2D(twist.linear.x, twist.linear.y, twist.angular.z)
+        return data_type(stamps.to_system(), data=speeds)
 
-        def convert(message: Any) -> Any:
-            twist = message.twist if stamped else message
-            speeds = Velocity2D(twist.linear.x, twist.linear.y, twist.angular.z)
-            return data_type(stamps.to_system(), data=speeds)
-
-        return convert
-
-    return maker
+    return convert
 
 
 def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
