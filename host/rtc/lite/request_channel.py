@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from tickrig.host.links.link import Link, LinkError
 from tickrig.host.rtc.lite.events import PingMonitor
@@ -60,17 +60,10 @@ class ProxySettings:
         """Raise ValueError for invalid settings."""
         if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
-        at_least = {"boot_us": 0, "linger_us": 0}
-        for name in (
-            "boot_us",
-            "reply_us",
-            "ping_period_us",
-            "pings",
-            "linger_us",
-            "search_period_us",
-        ):
-            value, low = getattr(self, name), at_least.get(name, 1)
-            if value < low:
+        at_least = dict.fromkeys(("boot_us", "linger_us"), 0)
+        at_least |= dict.fromkeys(("reply_us", "ping_period_us", "pings", "search_period_us"), 1)
+        for name, low in at_least.items():
+            if (value := getattr(self, name)) < low:
                 raise ValueError(f"{name} is {value}, at least {low} is needed")
 
 
@@ -83,22 +76,6 @@ _KEPT: Final = 8
 """Number of frames that are kept, so that a report can show the last frames."""
 
 _LOG: Final = log_of(__name__)
-
-
-class _ReplyDecoder(Protocol):
-    """Type of a decoder, which is `Decoder` or `RtnoReplies`."""
-
-    @property
-    def lost(self) -> bool:
-        """Whether all bytes are dropped until `clear`."""
-        ...
-
-    def clear(self) -> None:
-        """Search for a header again."""
-
-    def push(self, data: bytes, /) -> list[LiteFrame | codes.LiteLinkFault]:
-        """Take received bytes. Return frames and faults."""
-        ...
 
 
 class _FrameLink:
@@ -118,7 +95,10 @@ class _FrameLink:
     """
 
     def __init__(
-        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: _ReplyDecoder
+        self,
+        link: Link[bytes],
+        encode: Callable[[LiteFrame], bytes],
+        decoder: LiteDecoder | RtnoReplies,
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
