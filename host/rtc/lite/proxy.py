@@ -107,16 +107,6 @@ def _demand(command: LiteCommand, reply: messages.LiteReply | None) -> messages.
 #
 # The wire does not carry the time of a value. The proxy stamps a value when it arrives.
 
-_KINDS: Final[dict[str, type[Any]]] = {
-    kind.__name__: kind
-    for kind in (
-        *(rtc.TimedBoolean, rtc.TimedChar, rtc.TimedOctet, rtc.TimedShort),
-        *(rtc.TimedLong, rtc.TimedFloat, rtc.TimedDouble),
-        *(rtc.TimedBooleanSeq, rtc.TimedCharSeq, rtc.TimedOctetSeq, rtc.TimedShortSeq),
-        *(rtc.TimedLongSeq, rtc.TimedFloatSeq, rtc.TimedDoubleSeq),
-    )
-}
-
 
 @dataclass(frozen=True, slots=True)
 class _InPortBridge:
@@ -133,7 +123,7 @@ class _InPortBridge:
         Raise DeviceRefused for an unknown type.
         """
         name, port_type = _read(profile)
-        return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
+        return cls(InPort(name, getattr(rtc, port_type.name)), profile.name, port_type)
 
     def take(self) -> messages.LitePortData | None:
         """Return the oldest unread value, or None.
@@ -166,7 +156,7 @@ class _OutPortBridge:
         Raise DeviceRefused for an unknown type.
         """
         name, port_type = _read(profile)
-        return cls(OutPort(name, _KINDS[port_type.name]), port_type)
+        return cls(OutPort(name, getattr(rtc, port_type.name)), port_type)
 
     def give(self, data: bytes, now_us: int) -> None:
         """Write a received value to the OutPort. Raise FieldError if its type does not fit."""
