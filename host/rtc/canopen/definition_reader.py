@@ -91,7 +91,7 @@ def many(item: _Reader) -> _Reader:
     return read
 
 
-def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
+def _once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
     """Return a reader of a list whose items must differ.
 
     `twice` makes the text of the error, such as `node 5 is there`.
@@ -117,7 +117,7 @@ def whole(low: int, high: int) -> _Reader:
     """Return a reader of a whole number in a range, written in decimal or as 0x..."""
 
     def read(node: Item, place: str) -> int:
-        value = plain(node)
+        value = _plain(node)
         if type(value) is not int or not low <= value <= high:
             _refuse(node, f"{place}: {value!r} is not a whole number in {low}..{high}")
         return value
@@ -125,9 +125,9 @@ def whole(low: int, high: int) -> _Reader:
     return read
 
 
-def rate(node: Item, place: str) -> float:
+def _rate(node: Item, place: str) -> float:
     """Read a number of Hz, above 0 and up to 1 kHz."""
-    value = plain(node)
+    value = _plain(node)
     if type(value) not in (int, float) or not 0 < value <= 1_000:
         _refuse(node, f"{place}: {value!r} is not a number with 0 < {place} <= 1000")
     return float(value)
@@ -135,7 +135,7 @@ def rate(node: Item, place: str) -> float:
 
 def _flag(node: Item, place: str) -> bool:
     """Read true or false."""
-    value = plain(node)
+    value = _plain(node)
     if type(value) is not bool:
         _refuse(node, f"{place}: {value!r} is not true or false")
     return value
@@ -178,7 +178,7 @@ def _member_of(kind: type[Enum]) -> _Reader:
     return lambda node, place: kind(word(node, place))
 
 
-def plain(node: Item) -> Any:
+def _plain(node: Item) -> Any:
     """Return the value of a scalar. For a list or mapping, return what it is as a word."""
     if node.is_list:
         return "a list"
@@ -236,7 +236,7 @@ def _fields(ids: Collection[int]) -> dict[str, _Reader]:
         "master": lambda node, place: _master(node, place, ids),
         "nodes": lambda node, place: None,
         "sdo": many(lambda node, place: _sdo(node, place, ids)),
-        "pdo_links": once(
+        "pdo_links": _once(
             lambda node, place: _link(node, place, ids), lambda link: f"{link.target} is linked"
         ),
         "rt_connections": many(_rt_connection),
@@ -254,7 +254,7 @@ def _master(node: Item, place: str, ids: Collection[int]) -> definition.MasterEn
         "node": _NODE_ID,
         "heartbeat_ms": _U16,
         "sync_ms": _U16,
-        "rate_hz": rate,
+        "rate_hz": _rate,
         "remove_ms": whole(0, 3_600_000),
         "reconnect": _flag,
         "leave": _one_of(*_LEAVE),
@@ -373,7 +373,7 @@ def _link(node: Item, place: str, ids: Collection[int]) -> definition.PdoLink:
     def end(node: Item, place: str, kind: str) -> definition.PdoName:
         match = _NODE_PDO.fullmatch(text(node, place))
         if match is None or match[2][:4] != kind:
-            _refuse(node, f"{place}: {plain(node)!r} is not like 16.{kind}2")
+            _refuse(node, f"{place}: {_plain(node)!r} is not like 16.{kind}2")
         _check_number(node, place, match[2])
         name = definition.PdoName(int(match[1]), match[2])
         _check_known(node, place, name.node, ids)
@@ -401,7 +401,7 @@ def _start(node: Item, place: str, ids: Collection[int]) -> definition.StartEntr
         _check_known(node, place, node_id, ids)
         return node_id
 
-    order = once(known, lambda node_id: f"node {node_id} is there")
+    order = _once(known, lambda node_id: f"node {node_id} is there")
     fields: dict[str, _Reader] = {"order": order, "autoactivate": _flag}
     return definition.StartEntry(**_read_table(node, place, fields))
 

@@ -14,6 +14,7 @@ from textual.containers import Container
 from tickrig.host.cli.messages import Refused
 from tickrig.host.control.requests import Object
 from tickrig.host.rtc.commands.request import request_system
+from tickrig.host.rtc.editor.styles import ALARM, DIM, LIT
 from tickrig.host.rtc.editor.system_link import SystemLink
 from tickrig.host.rtc.editor.system_picture import SystemPicture
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
@@ -25,9 +26,6 @@ from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView, plain
 
 PAINT_S: Final = 0.1
 
-_DIM: Final = "bright_black"
-_MARK: Final = "bold yellow"
-_ALARM: Final = "bold red"
 _GOOD: Final = "green"
 
 _MOVES: Final = ("activate", "deactivate", "reset")
@@ -59,13 +57,13 @@ def _detail_rows(component: Any, port: str = "") -> list[CursorRow[_Setting]]:
     rows = list(_connector_rows(component, port)) if port else []
     configuration = component["configuration"]
     if not configuration["parameters"]:
-        rows.append(CursorRow("none", plain("no configuration parameters", _DIM), _Setting()))
+        rows.append(CursorRow("none", plain("no configuration parameters", DIM), _Setting()))
     for one in configuration["parameters"]:
         allowed = f"  [{one['constraint']}]" if one["constraint"] else ""
         line: Line = (
             (f"{one['name']} = ", ""),
             (f"{one['value']} {one['unit']}".rstrip(), "bold"),
-            (allowed, _DIM),
+            (allowed, DIM),
         )
         rows.append(
             CursorRow(f"holds {one['name']}", line, _Setting("", one["name"], one["value"]))
@@ -74,7 +72,7 @@ def _detail_rows(component: Any, port: str = "") -> list[CursorRow[_Setting]]:
         active = set_id == configuration["active"]
         mark = ("  active", _GOOD) if active else ("", "")
         rows.append(
-            CursorRow(f"set {set_id}", (("set ", _DIM), (set_id, "bold"), mark), _Setting(set_id))
+            CursorRow(f"set {set_id}", (("set ", DIM), (set_id, "bold"), mark), _Setting(set_id))
         )
         for name, value in values.items():
             line = (f"  {name} = ", ""), (value, "bold")
@@ -88,15 +86,15 @@ def _connector_rows(component: Any, port: str) -> Iterator[CursorRow[_Setting]]:
         return
     data_type = described["data_type"].removeprefix("IDL:").removesuffix(":1.0")
     head = described["kind"], data_type.removeprefix("RTC/")
-    yield CursorRow("port", ((" ".join(head).rstrip(), _DIM),), _Setting())
+    yield CursorRow("port", ((" ".join(head).rstrip(), DIM),), _Setting())
     for interface in described["interfaces"]:
         text = f"{interface['polarity'].lower()} {interface['name']} ({interface['type']})"
-        yield CursorRow(f"interface {interface['name']}", plain(text, _DIM), _Setting())
+        yield CursorRow(f"interface {interface['name']}", plain(text, DIM), _Setting())
     for connector in described["connectors"]:
         peer = next((one for one in connector["ports"] if one != port), port)
         kind = connector["properties"].get("dataport.subscription_type", "")
         lost = "  lost" if connector.get("state") == "lost" else ""
-        line: Line = (("with ", _DIM), (peer, _GOOD), (f"  {kind}", _DIM), (lost, _ALARM))
+        line: Line = (("with ", DIM), (peer, _GOOD), (f"  {kind}", DIM), (lost, ALARM))
         yield CursorRow(f"connector {peer}", line, _Setting(peer=peer))
 
 
@@ -169,11 +167,11 @@ class SystemScreen(FramedApp):
         active = sum(one["state"] == "ACTIVE" for one in components)
         line: Line = (
             (f" {counted(len(components), 'component')}, {active} active  ", ""),
-            (f"marked: {self.view.marked}  " if self.view.marked else "", _MARK),
-            (self._socket, _DIM),
+            (f"marked: {self.view.marked}  " if self.view.marked else "", LIT),
+            (self._socket, DIM),
         )
         if self._link.problem:
-            line = plain(f" the system is gone, waiting for it ({self._link.problem})", _ALARM)
+            line = plain(f" the system is gone, waiting for it ({self._link.problem})", ALARM)
         self.status.show([line])
 
     def _frame(self) -> None:

@@ -55,6 +55,7 @@ from typing import Final, NamedTuple
 
 from rich.cells import cell_len
 
+from tickrig.host.rtc.editor.styles import DIM, LIT, STATES
 from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.text.page_text import in_cells
 
@@ -65,12 +66,9 @@ _MOST_BOX: Final = 26
 _LEAST_BOX: Final = 9
 """Largest and least width of a box with its frame in cells."""
 
-_STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
 _FRAMES: Final = {"ACTIVE": "green", "INACTIVE": "cyan", "ERROR": "bold red"}
-_DIM: Final = "bright_black"
 _WIRE: Final = "green"
 _PAST_PC: Final = "magenta"
-_LIT: Final = "bold yellow"
 _NAME: Final = "bold"
 
 _NORTH, _EAST, _SOUTH, _WEST = 1, 2, 4, 8
@@ -413,7 +411,7 @@ class _Layout:
         for number, wire in enumerate(self._wires):
             style = _PAST_PC if wire.dashed else _WIRE
             if wire.source in lit or wire.target in lit:
-                style = _LIT
+                style = LIT
             canvas.wire(self._path(number), style, dashed=wire.dashed)
         connected = {end for wire in self._wires for end in (wire.source, wire.target)}
         places = dict[str, _Place]()
@@ -447,7 +445,7 @@ class _Layout:
         row, column = self._cells[box.name]
         top, left, width = self._tops[row], self._lefts[column], self._widths[column]
         right, bottom = left + width - 1, top + self._height(box) - 1
-        frame = _FRAMES.get(box.state, _DIM)
+        frame = _FRAMES.get(box.state, DIM)
         canvas.text(top, left, f"┌{'─' * (width - 2)}┐", frame)
         canvas.text(bottom, left, f"└{'─' * (width - 2)}┘", frame)
         for line in range(top + 1, bottom):
@@ -459,11 +457,11 @@ class _Layout:
         if state:
             at = right - 2 - cell_len(state)
             canvas.text(bottom, at, " ", frame)
-            canvas.text(bottom, at + 1, state, _STATES.get(box.state, _DIM))
+            canvas.text(bottom, at + 1, state, STATES.get(box.state, DIM))
             canvas.text(bottom, right - 1, " ", frame)
         room = width - 4 - (cell_len(state) + 1 if state else 0)
         if box.title and room > 2:
-            canvas.text(bottom, left + 1, f" {_shown(box.title, room)} ", _DIM)
+            canvas.text(bottom, left + 1, f" {_shown(box.title, room)} ", DIM)
         ends = dict(self._ends(box))
         for port, is_in in (*((one, True) for one in box.ins), *((one, False) for one in box.outs)):
             full = f"{box.name}.{port}"
@@ -472,7 +470,7 @@ class _Layout:
             at = left + 1 if is_in else right - size
             canvas.text(line, at, text, lit.get(full, ""))
             if full in connected:
-                style = _LIT if full in lit else frame
+                style = LIT if full in lit else frame
                 canvas.text(line, left if is_in else right, "▶" if is_in else "├", style)
             places[full] = _Place(line, at, size)
 
@@ -519,7 +517,7 @@ class _Canvas:
 
     def _add(self, line: int, cell: int, side: int, style: str, dashed: bool) -> None:
         sides, before, is_dashed = self._wires.get((line, cell), (0, style, dashed))
-        shown_style = _LIT if _LIT in (before, style) else before
+        shown_style = LIT if LIT in (before, style) else before
         self._wires[line, cell] = sides | side, shown_style, is_dashed and dashed
 
     def lines(self, height: int) -> tuple[_Line, ...]:

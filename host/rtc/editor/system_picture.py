@@ -10,6 +10,7 @@ from textual.events import Click, Resize
 from textual.message import Message
 
 from tickrig.host.rtc.editor.picture import Picture, draw, neighbour
+from tickrig.host.rtc.editor.styles import LIT
 from tickrig.host.rtc.editor.widgets import FramedView
 from tickrig.host.rtc.system.dot import Box, Edge
 
@@ -104,7 +105,7 @@ class SystemPicture(FramedView):
         self.show(self.picture.lines)
 
     def _draw(self, columns: int) -> Picture:
-        lit = {self.marked: "bold yellow"} if self.marked else {}
+        lit = {self.marked: LIT} if self.marked else {}
         if self.at:
             lit[self.at] = "reverse" if self.has_focus else "underline"
         return draw(self._boxes, self._edges, columns, lit)

@@ -31,7 +31,7 @@ _C_TYPES: Final = {
 }
 """C types by the data types of ports."""
 
-NODE_ID: Final = 0x80
+_NODE_ID: Final = 0x80
 """Bit of `access`, in addition to those of `Access`: the node-ID is added to the default."""
 
 _TEMPLATE: Final = string.Template(Path(__file__).with_name("header.txt").read_text("utf-8"))
@@ -93,7 +93,7 @@ def _table(profile: RtcProfile, rows: list[EntryDescription], lower: str) -> Ite
 
 
 def _entry(row: EntryDescription, port: PlacedPort | None, lower: str) -> str:
-    access = row.access.value | (NODE_ID if row.relative else 0)
+    access = row.access.value | (_NODE_ID if row.relative else 0)
     number, text, size = "0u", "NULL", row.data_type.size
     if port is not None and port.profile.port_type.width and row.sub in port.subs:
         size = port.profile.port_type.max_bytes

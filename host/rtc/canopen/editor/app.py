@@ -30,6 +30,7 @@ from tickrig.host.rtc.canopen.editor.system_pane import (
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NodeView, PortView, ServerView, SystemView
+from tickrig.host.rtc.editor.styles import ALARM, DIM, LIT
 from tickrig.host.rtc.editor.system_picture import SystemPicture
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.rtc.states import RtcRefused
@@ -37,9 +38,6 @@ from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView, plain
 
 # The line at the bottom, and lines of events.
 
-_DIM: Final = "bright_black"
-_MARK: Final = "bold yellow"
-_ALARM: Final = "bold red"
 
 _STAMP: Final = 12
 """Number of columns of a time."""
@@ -59,10 +57,10 @@ _GOOD: Final = (
 def _event_lines(event: ServerEvent, width: int) -> list[Line]:
     """Return an event as lines of at most `width` columns, wrapped between words."""
     at, _, rest = str(event).partition(" ")
-    style = "" if event.kind in _GOOD else _ALARM
+    style = "" if event.kind in _GOOD else ALARM
     stamps = chain([f"{at:>{_STAMP}} "], repeat(" " * (_STAMP + 1)))
     parts = wrap(rest, max(1, width - _STAMP - 1)) or [""]
-    return [((stamp, _DIM), (part, style)) for stamp, part in zip(stamps, parts, strict=False)]
+    return [((stamp, DIM), (part, style)) for stamp, part in zip(stamps, parts, strict=False)]
 
 
 def _status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:
@@ -72,7 +70,7 @@ def _status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) 
     return (
         (f" {file} ", "bold"),
         (f" {bus}  {ready} of {len(nodes)} nodes ready, {active} active", ""),
-        (f"  marked: {marked.partition(' ')[2]}" if marked else "", _MARK),
+        (f"  marked: {marked.partition(' ')[2]}" if marked else "", LIT),
     )
 
 

@@ -15,6 +15,7 @@ from tickrig.host.canmon.model.decode.node_memory import (
 )
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
+from tickrig.host.rtc.editor.styles import ALARM, DIM, LIT
 from tickrig.host.rtc.editor.widgets import CursorRow, CursorView
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsError
@@ -30,9 +31,6 @@ _FIRST_INDEX: Final = 0x1000
 _NAME: Final = 30
 """Number of columns of a name."""
 
-_DIM: Final = "bright_black"
-_ALARM: Final = "bold red"
-_CHANGED: Final = "bold yellow"
 
 _ObjectRow = CursorRow[Entry]
 
@@ -162,9 +160,9 @@ class _NodeObjects:
         data, problem = self._values.get(entry), self._problems.get(entry)
         kind = "" if text.kind is None else text.kind.name
         value = "" if data is None else f"{text.read(data)[1]} {text.unit}"
-        head = (f"{write_entry(entry)} ", _DIM), (f"{_tail(text.name):<{_NAME}} ", "")
-        style = _CHANGED if entry in self._changed else "bold"
-        rest = ((problem, _ALARM),) if problem else ((f"{kind:<14} ", _DIM), (value, style))
+        head = (f"{write_entry(entry)} ", DIM), (f"{_tail(text.name):<{_NAME}} ", "")
+        style = LIT if entry in self._changed else "bold"
+        rest = ((problem, ALARM),) if problem else ((f"{kind:<14} ", DIM), (value, style))
         return CursorRow(write_entry(entry), (*head, *rest), entry)
 
 

@@ -17,15 +17,13 @@ from tickrig.host.rtc.canopen.definition import TPDOS, DeviceFile, PdoLink, PdoN
 from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
+from tickrig.host.rtc.editor.styles import ALARM, DIM, LIT
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.text.values import counted
 from tickrig.host.tui import KeyFooter, Line, LineView, plain
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject, PdoDescription, fields
 
-_DIM: Final = "bright_black"
-_CHANGED: Final = "bold yellow"
 _GOOD: Final = "bold green"
-_ALARM: Final = "bold red"
 _NAME: Final = 40
 """Number of columns of the name of an object."""
 
@@ -70,9 +68,9 @@ def _pdo_rows(
         for place, (mapped, shift) in enumerate(fields(pdo.mapping)):
             at = mapped.index, mapped.sub
             line: Line = (
-                (f"   {place + 1:>2}  ", _DIM),
+                (f"   {place + 1:>2}  ", DIM),
                 (f"{mapped.index:04X}h:{mapped.sub:02X}", ""),
-                (f"  bit {shift:>2}  {mapped.bits:>2} bits  ", _DIM),
+                (f"  bit {shift:>2}  {mapped.bits:>2} bits  ", DIM),
                 (names.get(at, "dummy" if mapped.index < 0x20 else "not in the EDS")[:_NAME], ""),
             )
             rows.append(CursorRow(f"{name} {place}", line, _PdoPlace(index, place)))
@@ -87,11 +85,11 @@ def _pdo_line(
     targets += [f"← {link.source}" for link in links if link.target == name]
     return (
         (f"{name!s:<11}", "bold"),
-        (f" {name.index:04X}h  ", _DIM),
-        ("on  " if pdo.enabled else "off ", _GOOD if pdo.enabled else _DIM),
+        (f" {name.index:04X}h  ", DIM),
+        ("on  " if pdo.enabled else "off ", _GOOD if pdo.enabled else DIM),
         (f"{pdo.can_id:03X}h  type {pdo.transmission_type:>3}  ", ""),
-        (f"{bits:>2} of {MAX_PDO_BITS} bits ", _ALARM if bits > MAX_PDO_BITS else ""),
-        (" changed" if pdo != there else "", _CHANGED),
+        (f"{bits:>2} of {MAX_PDO_BITS} bits ", ALARM if bits > MAX_PDO_BITS else ""),
+        (" changed" if pdo != there else "", LIT),
         ("".join(f"  {text}" for text in targets), "green"),
     )
 
@@ -188,24 +186,24 @@ class PdoScreen(ModalScreen[None]):
     def _status(self) -> Line:
         hint = "; keys change nothing until it ends" if self._busy_hit else ""
         if self._writing is not None:
-            return plain(f" writing to the node ...{hint}", _CHANGED)
+            return plain(f" writing to the node ...{hint}", LIT)
         if self._reading is not None or self._saving is not None:
-            return plain(f" reading the node ...{hint}", _DIM)
+            return plain(f" reading the node ...{hint}", DIM)
         self._busy_hit = False
         if self._says[0][0]:
             return self._says
         if not self.pdos:
-            return plain(" waits for the node", _DIM)
+            return plain(" waits for the node", DIM)
         if self.wanted:
-            return plain(f" {len(self.wanted)} changed, not written: w writes, u undoes", _CHANGED)
-        return plain(" as in the node", _DIM)
+            return plain(f" {len(self.wanted)} changed, not written: w writes, u undoes", LIT)
+        return plain(" as in the node", DIM)
 
     def _take(self) -> None:
         """Process the results of transfers."""
         if (reading := self._reading) is not None and reading.done:
             self._reading = None
             if reading.problem:
-                self._note(reading.problem, _ALARM)
+                self._note(reading.problem, ALARM)
             else:
                 self.pdos = dict(reading.data)
                 self.wanted = {i: p for i, p in self.wanted.items() if p != self.pdos.get(i)}
@@ -213,7 +211,7 @@ class PdoScreen(ModalScreen[None]):
         if (writing := self._writing) is not None and writing.done:
             self._writing = None
             if writing.problem:
-                self._note(writing.problem, _ALARM)
+                self._note(writing.problem, ALARM)
             else:
                 self._note("written, and read back", _GOOD)
                 self.pdos |= self.wanted
@@ -348,8 +346,8 @@ class PdoScreen(ModalScreen[None]):
                 str(pdo.name),
                 (
                     (f"{pdo.name!s:<12} ", ""),
-                    (f"{pdo.bits:>2} bits  {node.name}", _DIM),
-                    ("  linked: cut" if pdo.name in links else "", _CHANGED),
+                    (f"{pdo.bits:>2} bits  {node.name}", DIM),
+                    ("  linked: cut" if pdo.name in links else "", LIT),
                 ),
                 pdo.name,
             )
@@ -395,7 +393,7 @@ class PdoScreen(ModalScreen[None]):
                 self._refuse(str(error))
             else:
                 self.wanted = dict(wanted)
-                self._note(f"{text}: {counted(len(wanted), 'changed PDO')}: w writes", _CHANGED)
+                self._note(f"{text}: {counted(len(wanted), 'changed PDO')}: w writes", LIT)
                 self.look()
 
         QuestionScreen("load the PDOs of a DCF", "").prompt(self.app, answered)
@@ -434,7 +432,7 @@ class PdoScreen(ModalScreen[None]):
                 f"{one.mapped.encode():08X}",
                 (
                     (f"{one.mapped.index:04X}h:{one.mapped.sub:02X} ", ""),
-                    (f"{one.mapped.bits:>2} bits  ", _DIM),
+                    (f"{one.mapped.bits:>2} bits  ", DIM),
                     (one.name, ""),
                 ),
                 one.mapped,
@@ -509,5 +507,5 @@ class PdoScreen(ModalScreen[None]):
             self.look()
 
     def _refuse(self, why: str) -> None:
-        self._note(why, _ALARM)
+        self._note(why, ALARM)
         self.look()

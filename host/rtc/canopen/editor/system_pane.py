@@ -19,6 +19,7 @@ from tickrig.host.rtc.canopen.view import (
     ServerView,
     SystemView,
 )
+from tickrig.host.rtc.editor.styles import ALARM, DIM, LIT, STATES
 from tickrig.host.rtc.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.tui import Line
@@ -27,10 +28,6 @@ Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
 _SystemRow = CursorRow[Item]
 _Owner = NodeView | ComponentView
 
-_STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
-_DIM: Final = "bright_black"
-_ALARM: Final = "bold red"
-_MARK: Final = "bold yellow"
 
 _KEPT_ROWS: Final = 4_096
 """Number of cached rows. 127 nodes have fewer rows, and an unchanged row is not written again."""
@@ -72,7 +69,7 @@ def _node(node: NodeView, folded: Collection[str]) -> _SystemRow:
         (f"{node.node_id:>3} {node.name:<12} ", "bold"),
         _state(node.proxy_state),
         (f" {nmt:<15} ", ""),
-        (f"{age:>8}", _ALARM if node.late else ""),
+        (f"{age:>8}", ALARM if node.late else ""),
         _phase(node),
     )
     return CursorRow(key, line, node)
@@ -82,7 +79,7 @@ def _phase(node: NodeView) -> tuple[str, str]:
     if node.phase is NodePhase.READY:
         return "", ""
     problem = f": {node.problem}" if node.problem else ""
-    return f"  {node.phase.value}{problem}", _ALARM if problem else _DIM
+    return f"  {node.phase.value}{problem}", ALARM if problem else DIM
 
 
 def _component(component: ComponentView, folded: Collection[str]) -> _SystemRow:
@@ -91,7 +88,7 @@ def _component(component: ComponentView, folded: Collection[str]) -> _SystemRow:
         (_fold(key, folded), ""),
         (f"    {component.name:<12} ", "bold"),
         _state(component.state),
-        (f" {component.type_name}", _DIM),
+        (f" {component.type_name}", DIM),
     )
     return CursorRow(key, line, component)
 
@@ -101,7 +98,7 @@ def _fold(key: str, folded: Collection[str]) -> str:
 
 
 def _state(state: str) -> tuple[str, str]:
-    return f"{state.capitalize():<8}", _STATES.get(state, _DIM)
+    return f"{state.capitalize():<8}", STATES.get(state, DIM)
 
 
 @lru_cache(_KEPT_ROWS)
@@ -111,7 +108,7 @@ def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> _SystemRow:
     text = f"{pdo.cob_id:03X}h {pdo.bits:>2} bits  {pdo.index:04X}h ↔ {pdo.proxy_index:04X}h"
     line: Line = (
         (f"      {pdo.name!s:<12} ", _style(key, marked)),
-        (text, _DIM),
+        (text, DIM),
         (linked, "green"),
     )
     return CursorRow(key, line, pdo)
@@ -124,25 +121,25 @@ def _port(port: PortView, marked: str) -> _SystemRow:
     peers = f" {'→' if port.out else '←'} {', '.join(port.peers)}" if port.peers else ""
     line: Line = (
         (f"      {way} {port.name:<20} ", _style(key, marked)),
-        (port.data_type, _DIM),
+        (port.data_type, DIM),
         (peers, "green"),
     )
     return CursorRow(key, line, port)
 
 
 def _style(key: str, marked: str) -> str:
-    return _MARK if key == marked else ""
+    return LIT if key == marked else ""
 
 
 def _joints(system: SystemView) -> Iterator[_SystemRow]:
     for link in system.links:
         text = f"{link.source} → {link.target}"
-        yield CursorRow(f"link {text}", (("  PDO link   ", _DIM), (text, "green")), link)
+        yield CursorRow(f"link {text}", (("  PDO link   ", DIM), (text, "green")), link)
     for entry in system.connections:
         text = f"{entry.source} → {entry.target}"
-        waits = (("  waits for its ports", _DIM),) if entry in system.waiting else ()
+        waits = (("  waits for its ports", DIM),) if entry in system.waiting else ()
         yield CursorRow(
-            f"connection {text}", (("  through PC ", _DIM), (text, "green"), *waits), entry
+            f"connection {text}", (("  through PC ", DIM), (text, "green"), *waits), entry
         )
 
 
