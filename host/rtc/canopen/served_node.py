@@ -455,11 +455,8 @@ class ServedNode:
         self.dialogue.start(self.operations.now_us, job)
 
     def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:
-        self.phase, self.layouts, self.received_us = (
-            NodePhase.READY,
-            layouts,
-            self.operations.now_us,
-        )
+        self.phase, self.layouts = NodePhase.READY, layouts
+        self.received_us = self.operations.now_us
         self._duplicates.forget()
         self.operations.booted()
         self._server.booted(self)

@@ -381,10 +381,8 @@ class RequestChannel:
             case codes.LiteCommand.IN_PROFILE | codes.LiteCommand.OUT_PROFILE:
                 self._take_profile(frame)
             case command if command in codes.FAULT_COMMANDS.values():
-                if self._awaited is not None:
-                    self._reply = messages.LiteReply(
-                        frame.data[0]
-                    )  # no status, so nothing that is OK
+                if self._awaited is not None:  # it is no status, so nothing that is OK
+                    self._reply = messages.LiteReply(frame.data[0])
             case command:
                 self._take_reply(command, messages.parse_reply(frame))
 

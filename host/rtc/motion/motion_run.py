@@ -84,9 +84,8 @@ class MotionRun:
     @property
     def cross_track(self) -> _CrossTrack:
         """Distance of the cart from the long lines of its path."""
-        errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
-            0.0
-        ]
+        legs = self._long_legs()
+        errors = [line.left(sample.pose) for line, leg in legs for sample in leg] or [0.0]
         square = fsum(error * error for error in errors) / len(errors)
         return _CrossTrack(sqrt(square), max(map(abs, errors)))
 

@@ -184,12 +184,10 @@ def _connection(node: ET.Element, word: str) -> ConnectionEntry:
     properties = {
         key: value.lower() for name, key in _TYPES.items() if (value := node.get(_rts(name)))
     }
-    if properties.get("dataport.subscription_type") == "periodic" and node.get(
-        _rts("pushInterval")
-    ):
-        interval_s = _number(node, "pushInterval")
-        if interval_s > 0:
-            properties["dataport.publisher.push_rate"] = str(1 / interval_s)
+    periodic = properties.get("dataport.subscription_type") == "periodic"
+    has_interval = periodic and node.get(_rts("pushInterval"))
+    if has_interval and (interval_s := _number(node, "pushInterval")) > 0:
+        properties["dataport.publisher.push_rate"] = str(1 / interval_s)
     for extra in node.findall(f"{{{_EXT}}}Properties"):
         properties[extra.get(f"{{{_EXT}}}name", "")] = extra.get(f"{{{_EXT}}}value", "")
     properties.pop("dataport.data_type", None)  # of rtcryo; the ports say it
