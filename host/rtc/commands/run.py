@@ -107,15 +107,10 @@ def _serve(stack: ExitStack, manager: Manager, options: _SystemOptions) -> None:
     stack.enter_context(stopped_by_signals(runner.stop))
     server = stack.enter_context(serving_control(options.control, control, clock))
     if options.engines:
-        join = load(_JOIN_ENGINES)
-        stack.enter_context(
-            join(
-                options.engines,
-                manager,
-                lambda calls: server.attach(calls, calls.make),
-                runner.stop,
-            )
+        joined = load(_JOIN_ENGINES)(
+            options.engines, manager, lambda calls: server.attach(calls, calls.make), runner.stop
         )
+        stack.enter_context(joined)
     _run(manager, runner, options)
     if options.save is not None:
         write_system(control.saved(file_format(options.save)), options.save)

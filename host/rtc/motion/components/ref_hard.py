@@ -160,16 +160,13 @@ class RefHardRh3(RtComponent):
         gains = (gain.value for gain in self.gains)
         limits = (self._limit(self.velocity_limit), self._limit(self.acceleration_limit))
         settings = (*gains, *(word for limit in limits for word in modbus.wide(limit)))
+        start = (modbus.Mode.VELOCITY, modbus.Command.CLEAR_FAULT, _WATCHDOG_MS)
         self._identified = bool(self.any_device.value)
         if not self._identified:
             self._orders.append(_IDENTITY)
         self._orders.append(_MODE)
         self._orders.append(_write(modbus.Address.GAIN_P, *settings))
-        self._orders.append(
-            _write(
-                modbus.Address.MODE, modbus.Mode.VELOCITY, modbus.Command.CLEAR_FAULT, _WATCHDOG_MS
-            )
-        )
+        self._orders.append(_write(modbus.Address.MODE, *start))
         self._orders.append(_write(modbus.Address.COMMAND, modbus.Command.ENABLE))
         return ReturnCode.RTC_OK
 
