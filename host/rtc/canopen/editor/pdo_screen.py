@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
@@ -171,7 +172,8 @@ class PdoScreen(ModalScreen[None]):
         if node.phase is not NodePhase.READY:
             self._read_once = False  # what comes back may be another device, or have other values
         elif not self._read_once and self._reading is None:
-            self._read(quiet=True)
+            with self._session.lock, suppress(ServerRefused):  # the next look tries again
+                self._begin_reading(self._session.view)
         title = f"PDOs of {node.node_id} {node.name}"
         state = node.proxy_state.capitalize() or node.phase.value
         problem = f": {node.problem}" if node.problem else ""
@@ -206,8 +208,8 @@ class PdoScreen(ModalScreen[None]):
                 self._note(reading.problem, ALARM)
             else:
                 self.pdos = dict(reading.data)
-                self.wanted = {i: p for i, p in self.wanted.items() if p != self.pdos.get(i)}
-                self.wanted = {i: p for i, p in self.wanted.items() if i in self.pdos}
+                there, wanted = self.pdos, self.wanted.items()
+                self.wanted = {i: p for i, p in wanted if i in there and p != there[i]}
         if (writing := self._writing) is not None and writing.done:
             self._writing = None
             if writing.problem:
@@ -224,27 +226,16 @@ class PdoScreen(ModalScreen[None]):
     def _note(self, text: str, style: str = "") -> None:
         self._says = plain(f" {text}", style)
 
-    def _read(self, *, quiet: bool = False) -> None:
-        def read(view: ServerView) -> None:
-            self._reading = view.read_pdos(self._node_id)
-            self._read_once = True
-
-        if quiet:
-            with self._session.lock:
-                try:
-                    read(self._session.view)
-                except ServerRefused:
-                    return
-        else:
-            self._command(read)
+    def _begin_reading(self, view: ServerView) -> None:
+        self._reading = view.read_pdos(self._node_id)
+        self._read_once = True
 
     # Keys.
 
     def action_read(self) -> None:
         """Read the PDOs again. Changes on this screen are kept."""
         if not self._is_busy():
-            self._says = plain("")
-            self._read()
+            self._command(self._begin_reading)
 
     def action_insert(self) -> None:
         """Ask for an object, and insert it after the entry under the cursor, or last in the PDO."""
@@ -385,13 +376,8 @@ class PdoScreen(ModalScreen[None]):
         def answered(text: str) -> None:
             if not text:
                 return
-            try:
+            with self._refused_at(text):
                 wanted = pdo_edit.pdos_of_dcf(Path(text), self._node_id, file, self.pdos)
-            except OSError as error:
-                self._refuse(f"{text}: {error.strerror}")
-            except ValueError as error:
-                self._refuse(str(error))
-            else:
                 self.wanted = dict(wanted)
                 self._note(f"{text}: {counted(len(wanted), 'changed PDO')}: w writes", LIT)
                 self.look()
@@ -487,13 +473,8 @@ class PdoScreen(ModalScreen[None]):
             self._refuse(f"{path} is not written: {transfer.problem}")
             return
         bit_rate = self._session.server.definition.bus.bitrate or _BIT_RATE
-        try:
+        with self._refused_at(path):
             pdo_edit.save_dcf(path, eds, self._node_id, bit_rate, transfer.data)
-        except OSError as error:
-            self._refuse(f"{path}: {error.strerror}")
-        except ValueError as error:
-            self._refuse(str(error))
-        else:
             self._note(f"{path}: {counted(len(transfer.data), 'value')} saved", _GOOD)
 
     def _command(self, command: Callable[[ServerView], object]) -> None:
@@ -505,6 +486,16 @@ class PdoScreen(ModalScreen[None]):
             self._refuse(str(error))
         else:
             self.look()
+
+    @contextmanager
+    def _refused_at(self, path: Path | str) -> Iterator[None]:
+        """Show why a file cannot be read or written."""
+        try:
+            yield
+        except OSError as error:
+            self._refuse(f"{path}: {error.strerror}")
+        except ValueError as error:
+            self._refuse(str(error))
 
     def _refuse(self, why: str) -> None:
         self._note(why, ALARM)
