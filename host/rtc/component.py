@@ -672,12 +672,9 @@ class ExecutionContext:
             Active. Otherwise, RTC_OK.
         """
         participant = self._find(component)
-        if participant is None:
-            return ReturnCode.BAD_PARAMETER
-        if participant.state is LifeCycleState.ACTIVE:
+        if participant is not None and participant.state is LifeCycleState.ACTIVE:
             return ReturnCode.PRECONDITION_NOT_MET
-        self._release(participant)
-        return ReturnCode.RTC_OK
+        return self.release_component(component)
 
     def release_component(self, component: RtComponent) -> ReturnCode:
         """Remove a component from the participants. If it is Active, call on_deactivated at once.
