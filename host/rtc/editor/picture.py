@@ -390,18 +390,16 @@ class _Layout:
             packed = _packed([(begin, end) for begin, end, _, _ in here])
             for (_, _, number, which), lane in zip(here, packed, strict=True):
                 self._lanes[number, which] = cell + 1 + self._gap * lane
-            count = 1 + max(packed, default=-1)
-            inner = 0 < channel < self._columns
-            cell += (1 + self._gap * count if count else 0) if not inner else 0
-            cell += max(3, 1 + self._gap * count) if inner else 0
+            width = 1 + self._gap * (1 + max(packed)) if packed else 0
+            cell += max(3, width) if 0 < channel < self._columns else width
             if channel < self._columns:
                 self._lefts.append(cell)
                 cell += widths[channel]
         self.width = cell
 
     def _width(self, box: Box) -> int:
-        texts = [box.name, f"{box.title} {box.state}".strip(), *(f"{port} " for port in box.ins)]
-        texts += [f"{port} " for port in box.outs]
+        texts = [box.name, f"{box.title} {box.state}".strip()]
+        texts += [f"{port} " for port in (*box.ins, *box.outs)]
         inner = max(cell_len(_shown(text, self._most)) for text in texts)
         return max(_LEAST_BOX, min(self._most, inner + 4))
 
