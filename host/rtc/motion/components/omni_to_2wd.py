@@ -55,8 +55,7 @@ class OmniTo2WD(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Plan for new input, and write FINISH."""
-        if (latest := ports.read_newest(self.current_position)) is not None:
-            self._pose = ports.to_pose(latest.data) or self._pose
+        self._pose = ports.read_newest_pose(self.current_position) or self._pose
         for message in ports.read_all(self.goal):
             self._take(message)
         if self._waiting and self._pose is not None:
