@@ -66,7 +66,9 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
         return self.default if self.kind is not bool else bool(self.default)
 
     def read(self, value: str | float) -> Any:
-        """Return a value of a rig file, converted as on the command line.
+        """Return the value of this field, converted from the value in a rig file.
+
+        The rules and error messages are those of the option on the command line.
 
         Raises:
             ValueError: the value is out of range, or has a wrong type.
@@ -104,17 +106,17 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
 def read_config(
     owner: str, fields: Iterable[DeviceField], config: Mapping[str, object]
 ) -> dict[str, Any]:
-    """Return the values of all fields.
+    """Return the values of all configuration fields of a device type, including the defaults.
 
     Args:
-        owner: the device type, for messages.
-        fields: fields of the device type.
-        config: values by option name of the command line, without leading dashes: `run-s` or
-            `run_s`. A field of several values has a list. Options that are missing get their
-            default.
+        owner: name of the device type, for error messages.
+        fields: configuration fields of the device type.
+        config: given values by option name. The names are those of the command line without leading
+            dashes: `run-s` or `run_s`. A field with several values gets a list. Missing options get
+            their default.
 
     Raises:
-        ValueError: a field is unknown, or a value is invalid. The message starts with the field.
+        ValueError: an option is unknown, or a value is invalid. The message begins with the option.
     """
     known = {field.word: field for field in fields}
     given: dict[str, Any] = {}
@@ -140,12 +142,13 @@ def read_config(
 def check_needed(
     fields: Iterable[DeviceField], values: Mapping[str, object], given: Container[str]
 ) -> None:
-    """Raise ValueError if a field is set that has no effect without another field.
+    """Raise ValueError if a configuration field is set that has no effect without another field.
 
     Args:
-        fields: fields of a device.
-        values: values by name of the field.
-        given: names of the fields that were set. A field with its default is not set.
+        fields: configuration fields of a device type.
+        values: values of all fields by field name.
+        given: names of the fields that the user has given. A field that was given its default does
+            not count as set.
     """
     known = {field.name: field for field in fields}
     for name, field in known.items():

@@ -125,15 +125,18 @@ class _MountedReader(Mounted):
 
 
 class CorridorStage:
-    """The cart, the node and the service of the demonstration, all in virtual time.
+    """Emulated cart, board and ucode service of the T-Kernel demonstration, in virtual time.
+
+    The cart drives along a corridor with ucode markers. The board estimates the position of the
+    cart from the markers, whose positions it gets from the service.
 
     Args:
-        caches: whether entries of the caches outlive an outage.
+        caches: whether the caches of the board keep their entries while the service is unreachable.
 
     Attributes:
         service: the service that resolves ucodes.
-        board: the board of the node.
-        loop: closed loop with the cart.
+        board: the emulated board, which runs the position detection.
+        loop: closed control loop that drives the cart.
         estimate: the estimated position of the cart.
     """
 
@@ -237,13 +240,14 @@ _HEAD: Final = "   time   x true   x odometry   x believed   off     hits stale 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The state of the demonstration at one time.
+    """Position errors at one time of the T-Kernel demonstration, for its plot.
 
     Attributes:
-        time_s: time since the beginning.
-        outage: whether the service was unreachable.
-        error_m: distance between the estimated and the true position.
-        odometry_error_m: distance between the position by odometry alone and the true position.
+        time_s: time since the start of the drive, in s.
+        outage: whether the ucode service was unreachable at this time.
+        error_m: distance between the estimated and the true position of the cart, in m.
+        odometry_error_m: distance between the position by odometry alone and the true position, in
+            m.
     """
 
     time_s: float
@@ -253,14 +257,14 @@ class Moment:
 
 
 def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:
-    """Run the demonstration.
+    """Run the T-Kernel demonstration: drive with the ucode service, then back without it.
 
     Args:
-        stage: the stage, which has not run yet.
-        echo: function that receives lines of text.
+        stage: cart, board and service, which have not run yet.
+        echo: function that is called with each line of the progress report.
 
     Returns:
-        The states every 100 ms, from the first step on.
+        The position errors every 100 ms, from the first step on.
     """
     moments: list[Moment] = []
     stage.loop.activate("tuned")

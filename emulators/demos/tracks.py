@@ -24,13 +24,14 @@ _NEVER: Final = Pose(nan, nan, nan)
 
 
 class RobotSample(NamedTuple):
-    """Pose and command of a robot at one time.
+    """Pose of a robot at one time of a recorded run.
 
     Attributes:
-        time_s: time since the start, in s.
-        pose: pose of the robot.
-        planned: commanded pose, or None without a command.
-        gap_m: distance to the robot that it follows, in m, or None if it does not follow a robot.
+        time_s: time since the start of the run, in s.
+        pose: true pose of the robot.
+        planned: pose that the robot was commanded to have, or None if there was no command.
+        gap_m: distance to the robot in front, in m, or None if this robot does not follow another
+            robot.
     """
 
     time_s: float
@@ -46,13 +47,13 @@ class RobotSample(NamedTuple):
 
 @dataclass(slots=True)
 class RobotTrack:
-    """The recorded motion of one robot.
+    """Recorded motion of one robot, which `draw` shows as a path and curves.
 
     Attributes:
-        name: name of the robot.
+        name: name of the robot in the legend.
         looks: samples of the robot, one sample every `LOOK_US`.
-        corners: corners of the planned path, if the path is known before the run. Otherwise `looks`
-            contain the path.
+        corners: corners of the planned path, if the path is known before the run. Otherwise the
+            planned path consists of the planned poses in `looks`.
     """
 
     name: str
@@ -75,11 +76,11 @@ class RobotTrack:
 
 
 class Mark(NamedTuple):
-    """A moment at which something was changed.
+    """A change during a run of the robots, which `draw` marks with a number in the picture.
 
     Attributes:
-        time_s: time since the start, in s.
-        text: description of the change.
+        time_s: time of the change since the start of the run, in s.
+        text: description of the change, for the list below the picture.
     """
 
     time_s: float
@@ -87,12 +88,12 @@ class Mark(NamedTuple):
 
 
 def advanced(pose: Pose, velocity: tuple[float, float, float], step_s: float) -> Pose:
-    """Return the pose after a command, of a robot that follows the command at once.
+    """Return the pose after a velocity command, for a robot that follows the command without delay.
 
     Args:
         pose: pose before the command.
         velocity: velocity forward and to the left in m/s, and turning rate in rad/s.
-        step_s: duration of the command in s.
+        step_s: time for which the robot moves with this velocity, in s.
 
     >>> advanced(Pose(), (0.5, 0.0, 0.0), 2.0)
     Pose(x=1.0, y=0.0, heading=0.0)
@@ -110,12 +111,15 @@ def advanced(pose: Pose, velocity: tuple[float, float, float], step_s: float) ->
 
 
 def draw(tracks: Sequence[RobotTrack], marks: Sequence[Mark], title: str) -> Figure:
-    """Draw paths, speeds and gaps.
+    """Draw the paths of robots, and their speeds, turning rates and gaps over time.
 
     Args:
-        tracks: tracks of the robots.
-        marks: marks that are numbered in the picture and listed below it.
+        tracks: recorded motions of the robots.
+        marks: changes during the run, which are numbered in the picture and listed below it.
         title: title of the picture.
+
+    Returns:
+        The figure of matplotlib.
     """
     follows = any(look.gap_m is not None for track in tracks for look in track.looks)
     figure = new_figure(12, 7)

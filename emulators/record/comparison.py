@@ -25,15 +25,17 @@ _KIND: Final = re.compile(r"[A-Za-z]\w*:|[0-9A-F]{3}#|[0-9A-F]{8}#", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class NumberRule:
-    """A tolerance for numbers in lines that match a pattern.
+    """Tolerance for the numbers in lines or frames that match a pattern.
+
+    `tickrig compare` uses such rules when it compares a recording with an emulator.
 
     Attributes:
-        pattern: shell pattern, such as `EV:batt*` or `181#*`.
-        least: largest allowed difference, in percent if `share` is true.
-        share: whether `least` is a percentage of the recorded number.
-        place: position of the field, or None for all decimal numbers of the line. The position
-            counts characters of a text line (hex digits), or data bytes of a frame, with the lowest
-            byte first.
+        pattern: shell pattern of the whole line or frame, such as `EV:batt*` or `181#*`.
+        least: largest allowed difference, in per cent of the recorded number if `share` is true.
+        share: whether `least` is a percentage.
+        place: first position and end of the number in the line, or None for all decimal numbers of
+            the line. Positions count the characters (hex digits) of a text line, or the data bytes
+            of a frame. A number in a frame has its lowest byte first.
     """
 
     pattern: str
@@ -84,10 +86,12 @@ def _split_numbers(text: str) -> tuple[str, list[float]]:
 
 
 def parse_number_rule(text: str) -> NumberRule:
-    """Read `PATTERN=TOLERANCE` or `PATTERN[FROM:TO]=TOLERANCE`; a `%` means a share.
+    """Parse a number tolerance: `PATTERN=TOLERANCE` or `PATTERN[FROM:TO]=TOLERANCE`.
+
+    A tolerance that ends in `%` is a percentage of the recorded number.
 
     Raises:
-        ValueError: the text has an invalid form.
+        ValueError: the text does not have one of these forms.
 
     >>> parse_number_rule("EV:batt*=5").allows("EV:batt 98", "EV:batt 95")
     True
@@ -103,11 +107,12 @@ def parse_number_rule(text: str) -> NumberRule:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """Tolerances of a comparison.
+    """Allowed deviations of an emulated run from a recorded run.
 
     Attributes:
-        time_us: tolerance of times, to which the drift of two clocks is added.
-        numbers: tolerances of numbers.
+        time_us: allowed deviation of a time in microseconds, to which the drift of two clocks is
+            added.
+        numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
         kinds: patterns of lines that are independent of all other lines. Such lines may come in
             another order than recorded.
@@ -131,9 +136,12 @@ class Tolerance:
         return any(fnmatchcase(text, pattern) for pattern in self.ignored)
 
     def kind(self, text: str) -> str:
-        """Return the kind of a line: its text up to a colon, its CAN-ID, or a pattern.
+        """Return the kind of a line, by which `compare` sorts lines.
 
-        The order of lines is compared within a kind.
+        The kind is the pattern of `kinds` that matches the line. Otherwise it is the text before a
+        colon, or the CAN-ID of a frame.
+
+        The order of lines is compared only within a kind.
         """
         for pattern in self.kinds:
             if fnmatchcase(text, pattern):
@@ -143,12 +151,13 @@ class Tolerance:
 
 
 class Said(NamedTuple):
-    """A line or frame sent by a device.
+    """A line or frame that a device has sent, as `compare` gets it.
 
     Attributes:
-        at_us: time of the end of the line or frame, since the start of the recording.
+        at_us: time at which the line or frame ended, in microseconds since the start of the
+            recording.
         text: text of the line or frame, as in a trace.
-        line: line number in the trace, or 0 without a trace.
+        line: line number in the trace file, or 0 if the line is not from a trace.
     """
 
     at_us: int
@@ -158,13 +167,14 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A recorded line and the corresponding line of the emulator.
+    """A recorded line and the emulator's line that `compare` has matched with it.
 
     Attributes:
-        kind: kind of the line. The order of lines is compared within a kind.
+        kind: kind of the line, such as its CAN-ID. `compare` checks the order of lines only within
+            a kind.
         recorded: recorded line, or None if only the emulator sent the line.
-        emulated: line of the emulator, or None if the emulator did not send it.
-        difference: description of the difference, or empty if the lines are equal.
+        emulated: line of the emulator, or None if the emulator did not send the line.
+        difference: description of the difference, or an empty text if the lines are equal.
     """
 
     kind: str
@@ -190,16 +200,17 @@ class Pair:
 def compare(
     recorded: Iterable[Said], emulated: Iterable[Said], until_us: int, tolerance: Tolerance
 ) -> list[Pair]:
-    """Compare two runs, kind by kind.
+    """Compare the lines that a device has sent in a recording with those of an emulator.
 
-    Lines of the emulator within the tolerance of the start or the end of the recording may be
-    missing in the recording.
+    The order of lines is compared only within a kind (`Tolerance.kind`). A line of the emulator is
+    ignored if it has no counterpart and is within the time tolerance of the start or the end of the
+    recording.
 
     Args:
         recorded: recorded lines in order of time.
         emulated: lines of the emulator in order of time.
-        until_us: duration of the recording.
-        tolerance: the tolerances.
+        until_us: duration of the recording in microseconds.
+        tolerance: the allowed deviations.
 
     Returns:
         All lines as pairs, in order of time.

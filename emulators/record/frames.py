@@ -66,12 +66,14 @@ class FrameFormat(Immutable):
     The functions `by_gap`, `by_length`, `by_size` and `by_delimiter` make such a rule.
 
     Attributes:
-        cut: function that returns the length of the first piece of some bytes, or 0 if the piece is
-            incomplete.
-        gap_us: length of a silence that ends an incomplete frame, or `NEVER` without a limit.
+        cut: function that gets the bytes since the last frame, and returns the length of the first
+            frame in them, or 0 if the frame is incomplete.
+        gap_us: duration of a silence that ends an incomplete frame, in microseconds, or `NEVER`
+            without a limit.
         delimiter: bytes after each frame, which are not part of the frame.
-        request: description of frames of the host; see `described`.
-        answer: description of frames of the device.
+        request: function or object that splits frames of the host into fields for a log; see
+            `described`.
+        answer: function or object that splits frames of the device into fields for a log.
     """
 
     cut: Callable[[bytes], int]
@@ -81,17 +83,16 @@ class FrameFormat(Immutable):
     answer: FrameFields | None = None
 
     def described(self, request: FrameFields, answer: FrameFields | None = None) -> FrameFormat:
-        """Return the same rule with descriptions, so that logs show frames field by field.
+        """Return a copy of the rule with which logs show the fields of each frame.
 
         Args:
-            request: description of frames of the host: a function that returns the fields of a
-                frame by name, or an object with such a method `parse`, such as a Struct of
-                construct. It raises an exception for an invalid frame.
-            answer: description of frames of the device. The default is the description of frames of
-                the host.
+            request: function that gets a frame of the host, and returns its fields by name. An
+                object with such a method `parse` is accepted, too, for example a Struct of
+                construct. An invalid frame raises an exception.
+            answer: the same for frames of the device. The default is `request`.
 
         Returns:
-            The rule with the descriptions.
+            The copy of the rule.
         """
         return replace(self, request=request, answer=answer or request)
 
@@ -100,10 +101,10 @@ class FrameFormat(Immutable):
         return FrameSplitter(self)
 
     def shown(self, mark: Mark, frame: bytes) -> bytes:
-        """Return a frame as shown in a log.
+        """Return a frame as a log shows it.
 
         Args:
-            mark: direction of the frame.
+            mark: direction of the frame: to the device or from the device.
             frame: bytes of the frame.
 
         Returns:
@@ -133,10 +134,10 @@ class FrameFormat(Immutable):
 
 
 class FrameSplitter(Copyable):
-    """Collects bytes into frames, however they are split into chunks.
+    """Splits received bytes of a serial line into frames, in whatever chunks the bytes arrive.
 
     Args:
-        rule: the splitting rule.
+        rule: rule that defines where a frame ends.
 
     Attributes:
         begun: bytes of an incomplete frame.
@@ -157,15 +158,15 @@ class FrameSplitter(Copyable):
         return self._rule.gap_us < NEVER
 
     def push(self, now_us: int, data: bytes) -> list[bytes]:
-        """Add received bytes and return completed frames.
+        """Add received bytes, and return the frames that are now complete.
 
         Args:
             now_us: present time in microseconds.
-            data: bytes received since the last call. Call the function without bytes when `due_us`
-                has passed.
+            data: bytes received since the last call. When `due_us` has passed, the method must be
+                called without bytes, so that a silence ends a frame.
 
         Returns:
-            The completed frames, and pieces that are not frames.
+            The completed frames, and pieces of data that are not complete frames.
         """
         out = []
         if self.due_us <= now_us:
@@ -189,11 +190,11 @@ class FrameSplitter(Copyable):
 
 
 class FrameLog:
-    """Splits the traffic of one direction into frames, and returns them as text for a log.
+    """Splits the traffic of one direction into frames, and returns the frames as text for a log.
 
     Args:
-        rule: the rule with its descriptions.
-        mark: direction of the traffic.
+        rule: rule that defines where a frame ends and how it is shown.
+        mark: direction of the traffic: to the device or from the device.
     """
 
     def __init__(self, rule: FrameFormat, mark: Mark) -> None:
@@ -233,11 +234,12 @@ class FrameLog:
 
 
 def by_gap(gap: str | int) -> FrameFormat:
-    """Split at silences of the line.
+    """Return a rule that splits serial data into frames at silences of the line.
 
     Args:
-        gap: length of the silence that ends a frame, such as `"2ms"`, or in us. It must be longer
-            than the time of a byte and longer than the control period of the device.
+        gap: duration of the silence that ends a frame: a text such as `"2ms"`, or a number in
+            microseconds. It must be longer than the time of a byte and longer than the control
+            period of the device.
 
     Returns:
         The rule.
@@ -256,12 +258,12 @@ def by_gap(gap: str | int) -> FrameFormat:
 
 
 def by_size(size: int, gap: str | int | None = None) -> FrameFormat:
-    """Split into frames of one size.
+    """Return a rule that splits serial data into frames of a fixed size.
 
     Args:
         size: size of each frame in bytes, 1 or more.
-        gap: length of a silence that ends an incomplete frame, such as `"20ms"`, or in us, or None
-            for no limit.
+        gap: duration of a silence that ends an incomplete frame: a text such as `"20ms"`, or a
+            number in microseconds, or None for no limit.
 
     Returns:
         The rule.
@@ -278,11 +280,12 @@ def by_size(size: int, gap: str | int | None = None) -> FrameFormat:
 
 
 def by_delimiter(delimiter: bytes, gap: str | int | None = None) -> FrameFormat:
-    """Split after a delimiter, which is not part of the frame.
+    """Return a rule that splits serial data after a delimiter, which is not part of the frame.
 
     Args:
         delimiter: bytes that end each frame.
-        gap: length of a silence that ends an incomplete frame, or None for no limit.
+        gap: duration of a silence that ends an incomplete frame: a text such as `"20ms"`, or a
+            number in microseconds, or None for no limit.
 
     Returns:
         The rule. A log shows printable ASCII as text and other frames in hex.
@@ -381,7 +384,7 @@ class _ByLength(Immutable):
 
 
 def hex_text(data: bytes) -> str:
-    """Return bytes in hex, in groups of four; long data are truncated and followed by their count.
+    """Return bytes as hex digits in groups of four; long data are cut and followed by their size.
 
     >>> hex_text(bytes.fromhex("0103 0452 4801"))
     '01030452 4801'

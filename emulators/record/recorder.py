@@ -23,9 +23,10 @@ from tickrig.wire.uart import UartSetting
 
 
 class TraceFile(NonCopyable):
-    """A trace that is written to a file. Each tick is written at once, so a kill loses no tick.
+    """A trace file that is written during a run, line by line.
 
-    If writing fails, the recording ends with one warning, and the run continues.
+    Each tick of the device is written at once, so no tick is lost if the process is killed. If
+    writing fails, the recording ends with one warning, and the run continues.
 
     Args:
         path: path of the file; an existing file is replaced.
@@ -43,7 +44,7 @@ class TraceFile(NonCopyable):
 
     @property
     def error(self) -> str:
-        """Reason for the early end of the recording, or "" if there was no error."""
+        """Reason why the recording ended early, or "" if there was no error."""
         return self._file.error
 
     def hear(self, now_us: int, done: Sequence[str], received: bytes, sent: bytes) -> None:
@@ -80,10 +81,12 @@ class _Trace(Protocol[_W_contra]):
 
 
 class DeviceBefore(Generic[W]):
-    """A device with the interface of another device; subclasses change the traffic.
+    """Wrapper of a device, with the same interface as the device.
+
+    Subclasses change or record the traffic of the wrapped device.
 
     Args:
-        device: the device behind this object.
+        device: the wrapped device.
     """
 
     def __init__(self, device: Device[W]) -> None:
@@ -154,15 +157,15 @@ class DeviceBefore(Generic[W]):
 
 
 class TracedDevice(DeviceBefore[W]):
-    """A recorded device with the same interface as the device itself.
+    """Wrapper that records a device in a trace; the wrapper has the interface of the device.
 
-    The object records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
-    controller. If the device has an `on_set`, as a node has for its objects, the calls of `on_set`
-    are recorded, too.
+    It records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
+    controller. If the device has a callback `on_set`, which nodes call when an object is set, these
+    calls are recorded, too.
 
     Args:
-        device: the device itself.
-        trace: storage of the ticks.
+        device: the device to record.
+        trace: storage that gets the recorded ticks.
     """
 
     def __init__(self, device: Device[W], trace: _Trace[W]) -> None:
@@ -194,13 +197,13 @@ class TracedDevice(DeviceBefore[W]):
 
     @property
     def due_us(self) -> int:
-        """Time at which the device is due, which is now if a reset must be recorded."""
+        """Time at which the device must be called next, or 0 if a change is not recorded yet."""
         if self._done:
             return 0  # a tick that is not due changes nothing, and a replay resets where it was
         return self._device.due_us  # type: ignore[no-any-return]  # a Device, asked in each tick
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Forward a report of the CAN controller; the report is recorded with the next tick."""
+        """Forward a state of the CAN controller to the device, and record it with the next tick."""
         if hasattr(self._device, "bus_state"):
             self._done.append(_BUS_STATE[state])
         super().bus_state(state)
@@ -242,15 +245,15 @@ _BUS_STATE = {state: text for text, state in BUS_STATE.items()}
 
 
 class Tick(NamedTuple):
-    """The events of a device in a tick, or of a wire between ticks (with the mark `~`).
+    """What happened to a device in one tick of a recording, or to a wire between ticks (mark `~`).
 
     Attributes:
-        at_us: time of the tick.
+        at_us: time of the tick in microseconds.
         name: name of the device or wire.
         done: actions before the tick, such as `stick=5`.
-        received: received bytes or frames.
-        sent: sent bytes or frames.
-        mark: mark of the actions.
+        received: bytes or frames that the device received.
+        sent: bytes or frames that the device sent.
+        mark: mark that the actions have in the trace.
     """
 
     at_us: int
@@ -315,12 +318,12 @@ class TraceRecorder(Copyable):
         self._last_us = 0
 
     def device(self, name: str, device: Device[W]) -> TracedDevice[W]:
-        """Return a recorded device, to be put on a rig instead of the given device.
+        """Return a wrapper that records a device, to be put on a rig in place of the device.
 
         Args:
             name: name of the device in the header.
             device: the device. It is recorded from its first tick on, including changes of its
-                `inputs` and of objects of a node that are set from the inside.
+                `inputs`, and of objects that a node itself sets.
 
         Raises:
             KeyError: the header has no such device.
@@ -329,19 +332,19 @@ class TraceRecorder(Copyable):
         return TracedDevice(device, _Channel(name, self))
 
     def wire_fault(self, now_us: int, wire: str, text: str) -> None:
-        """Record the start or end of a wire fault.
+        """Record the start or end of a fault on a wire.
 
         Args:
-            now_us: time of the change.
+            now_us: time of the change in microseconds.
             wire: name of the wire in the header.
             text: text of the fault, such as `cut` or `drop=0.1`, or `cut=0` for the end of the
-                fault.
+                fault `cut`.
         """
         self.add(Tick(now_us, wire, (text,), mark=Mark.WIRE))
 
     @property
     def error(self) -> str:
-        """Reason for the early end of the recording, or "" if there was no error."""
+        """Reason why the recording ended early, or "" if there was no error."""
         return self._file.error if self._file else ""
 
     @property
@@ -369,10 +372,10 @@ class TraceRecorder(Copyable):
         self._ticks, self._in_memory = [], 0
 
     def lines(self, now_us: int) -> Iterator[str]:
-        """Yield the lines of the recording up to a time.
+        """Yield the lines of the trace, with an end line that has the present time.
 
         Args:
-            now_us: time of the rig.
+            now_us: present time of the rig in microseconds.
         """
         yield self.header.encode()
         for part in (*self._shared, _Ticks(self._ticks)):
@@ -380,14 +383,14 @@ class TraceRecorder(Copyable):
         yield BenchRecord(max(now_us, self._last_us), "", Mark.END).encode()
 
     def save(self, path: Path, now_us: int) -> None:
-        """Write the recording to a file.
+        """Write the recording, which is kept in memory, to a trace file.
 
         Args:
             path: path of the file; an existing file is replaced.
-            now_us: time of the rig.
+            now_us: present time of the rig in microseconds.
 
         Raises:
-            ValueError: the recorder already writes to a file.
+            ValueError: the run is already recorded in a file, and so not kept in memory.
             OSError: the file cannot be written.
         """
         if self._forgetful:
@@ -511,17 +514,18 @@ _logger = log_of(__name__)
 
 
 class CandumpFile:
-    """A log that is written to a file. Each line is written at once, so a kill loses no line.
+    """Log of a CAN bus in candump's format, written to a file during a run.
 
-    If writing fails, the recording ends with one warning, and the run continues. Use the method
-    `hear` as observer of a `CanWire`.
+    Each line is written at once, so no line is lost if the process is killed. If writing fails, the
+    recording ends with one warning, and the run continues. Use the method `hear` as observer of a
+    `CanWire`.
 
     Args:
         path: path of the file; an existing file is replaced.
         channel: name of the bus in the log.
 
     Attributes:
-        error: reason for the early end of the recording, or empty if there was no error.
+        error: reason why the recording ended early, or empty if there was no error.
 
     Raises:
         ValueError: the channel is empty, or has blanks.

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ReplayDifference(Generic[W]):
-    """The first tick in which the output differs from the recording.
+    """The first tick of a replay in which the device's output differs from the recording.
 
     Attributes:
-        at_us: time of the tick.
-        recorded: recorded output.
-        replayed: output in the replay.
-        line: line number in the trace, or 0 without recorded output.
+        at_us: time of the tick in microseconds.
+        recorded: output of the device in the recording.
+        replayed: output of the device in the replay.
+        line: line number in the trace, or 0 if the recording has no output in this tick.
     """
 
     at_us: int
@@ -119,13 +119,13 @@ def _first_difference(
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """A trace that has been read.
+    """Content of a trace with a single device, as `read_recording` returns it.
 
     Attributes:
         header: header with the device and its configuration.
         records: lines of the trace in order.
-        ended: whether the trace contains the duration of the run. If not, the writer was killed or
-            its disk was full. The last tick may then be incomplete and is left out.
+        ended: whether the trace has its end line. If not, the writer was killed or its disk was
+            full. The last tick may then be incomplete and is left out of `records`.
     """
 
     header: trace.Header
@@ -144,7 +144,7 @@ class RecordedRun:
 
 
 def read_recording(data: bytes) -> RecordedRun:
-    """Read a trace; the writer may have been killed in the middle of a line.
+    """Read a trace with a single device, even if its writer was killed in the middle of a line.
 
     Raises:
         TraceError: the data are not a trace of this version, or a line is damaged.
@@ -159,7 +159,10 @@ def read_recording(data: bytes) -> RecordedRun:
 
 
 def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[bytes] | None:
-    """Replay a recording on a new device; return the first difference, or None if there is none.
+    """Replay a recording on a new device, and compare the device's output with the recording.
+
+    Returns:
+        The first difference, or None if the output is the same.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -193,13 +196,13 @@ _Traffic = bytes | Frames
 
 @dataclass(frozen=True)
 class BenchRecording:
-    """A trace that has been read.
+    """Content of a trace with any number of devices, as `read_trace` returns it.
 
     Attributes:
-        header: description of the bench.
+        header: description of the devices and wires.
         records: lines of the trace in order.
-        ended: whether the trace contains the duration of the run. If not, the writer was killed or
-            its disk was full. The last tick may then be incomplete and is left out.
+        ended: whether the trace has its end line. If not, the writer was killed or its disk was
+            full. The last tick may then be incomplete and is left out of `records`.
     """
 
     header: bench_header.BenchHeader
@@ -273,7 +276,7 @@ class BenchRecording:
         )
 
     def ticks_of(self, name: str) -> set[int]:
-        """Return the ticks at which a device had traffic or a change, in microseconds.
+        """Return the times in microseconds at which a device had traffic or a change.
 
         Args:
             name: name of the device.
@@ -311,13 +314,14 @@ def _row(record: BenchRecord) -> tuple[object, ...]:
 
 
 def read_trace(path: Path | str) -> BenchRecording:
-    """Read a trace of either version.
+    """Read a trace file in either format: of a single device, or of a bench.
 
     Args:
         path: path of the file.
 
     Returns:
-        The recording. If its writer was killed, the recording ends before the last tick.
+        The recording. If its writer was killed, the last tick is left out, because it may be
+        incomplete.
 
     Raises:
         OSError: the file cannot be read.
@@ -327,7 +331,9 @@ def read_trace(path: Path | str) -> BenchRecording:
 
 
 def read_bench_recording(data: bytes) -> BenchRecording:
-    """Read a trace of either version; the writer may have been killed in the middle of a line.
+    """Read the bytes of a trace in either format: of a single device, or of a bench.
+
+    The writer may have been killed in the middle of a line.
 
     Raises:
         TraceError: the data are not a trace, or a line is damaged.
@@ -362,12 +368,15 @@ def _as_bench(recording: RecordedRun) -> BenchRecording:
 def replay_device(
     recording: BenchRecording, name: str, device: Device[Any]
 ) -> ReplayDifference[Any] | None:
-    """Replay a recorded device on a new device; return the first difference, or None.
+    """Replay the traffic of a recorded device on a new device, and compare the output.
 
     Args:
         recording: recording of the bench.
-        name: name of the device in the run.
-        device: a new device.
+        name: name of the recorded device.
+        device: a new device of the same type.
+
+    Returns:
+        The first difference between recorded and new output, or None if there is none.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -378,7 +387,7 @@ def replay_device(
 
 
 def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
-    """Replay a recorded device on a new device; return its output, each with its tick.
+    """Replay the traffic of a recorded device on a new device; return its output with the times.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -397,7 +406,11 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, _Traffic, int]]:
-    """Yield the traffic of one direction by tick: time, all data, first line in the trace."""
+    """Yield the traffic of one direction, joined by tick.
+
+    Each item has the time of the tick, all bytes or frames of this tick, and the number of their
+    first line in the trace.
+    """
     together: list[Any] = []
     at_us = line = -1
     for record in [record for record in records if record.mark is mark]:
@@ -417,7 +430,7 @@ def _joined(together: list[Any]) -> _Traffic:
 
 
 def do(device: Any, record: BenchRecord) -> None:
-    """Repeat the actions on a device.
+    """Repeat on a device a recorded action: a reset, a set input, or a state of the CAN controller.
 
     Raises:
         TraceError: an input is unknown, or a value is invalid.

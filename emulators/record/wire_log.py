@@ -18,13 +18,13 @@ from tickrig.wire.lines import LineSplitter
 
 @dataclass(frozen=True, slots=True)
 class WireLine:
-    """A line of text, or a frame, on a wire.
+    """A line of text or a frame on a wire, as an entry of a `WireLog`.
 
     Attributes:
-        number: number of the line in the run, counted from 1.
-        at_us: time of the last byte of the line.
-        mark: direction of the line.
-        data: content of the line without its end.
+        number: number of the entry in the run, counted from 1.
+        at_us: time of the last byte, in microseconds.
+        mark: direction: to the device or from the device.
+        data: content without the end of line.
         source: name of the wire or device, if there are several.
     """
 
@@ -51,12 +51,12 @@ def line_splitter(mark: Mark) -> Splitter:
 
 
 class WireLog:
-    """Splits traffic into lines, keeps the latest, and calls its listeners.
+    """Log of a wire: splits traffic into lines or frames, keeps the latest, and calls listeners.
 
     Args:
         keep: number of lines to keep.
-        splitter: function that makes the splitter of each direction. The default is a splitter into
-            lines.
+        splitter: function that makes the splitter for a direction. The default splits at the ends
+            of lines.
 
     Attributes:
         listeners: functions that are called with each complete line.
@@ -74,11 +74,13 @@ class WireLog:
         self._wake: Callable[[int], None] | None = None
 
     def follow(self, rig: Rig, name: str) -> None:
-        """Add a frame as soon as the silence that ends it is long enough, not at the next traffic.
+        """Log a frame that a silence ends as soon as the silence is long enough.
+
+        Without this call such a frame is logged only with the next traffic.
 
         Args:
-            rig: the rig with the time.
-            name: name of the line.
+            rig: the rig whose time ends the silence.
+            name: name of the serial line.
         """
         logs = self._splitters.values()
         if any(isinstance(each, FrameLog) and each.ends_by_time for each in logs):
@@ -117,11 +119,11 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return the unfinished line or frame of each direction, which has no number.
+        """Return the incomplete line or frame of each direction; it has the number 0.
 
         Args:
-            by_gap: whether to return instead the frames that only a silence ends. Each of them may
-                be complete.
+            by_gap: whether to return only frames that a silence ends, which may already be
+                complete. If false, only other lines and frames are returned.
         """
         return tuple(
             WireLine(0, at_us, mark, data)
@@ -132,7 +134,7 @@ class WireLog:
     def add(
         self, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str = ""
     ) -> None:
-        """Add a complete line; frames are formatted on access, which saves 5 % of the time."""
+        """Add a complete line or frame to the log, and call the listeners."""
         self._count += 1
         whole = (self._count, at_us, mark, line, source)
         self._lines.append(whole)
