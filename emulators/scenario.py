@@ -99,13 +99,13 @@ _EXPECT: Final = re.compile(r"(.*\S)\s+within\s+(\S+)")
 
 
 class ScenarioParser:
-    """Reads and checks scenarios for one device.
+    """Parses and checks scenarios, which are timed scripts for one emulated device.
 
     Args:
-        device: device whose inputs and outputs are the valid names.
+        device: device whose inputs and outputs the scenario may name.
         operator: operator of the device, which determines the valid actions.
         encoders: further verbs that send a line, in addition to `send`.
-        senders: sending verbs of a wire without lines.
+        senders: sending verbs for a wire without text lines, in place of `send` and the encoders.
     """
 
     def __init__(
@@ -131,7 +131,11 @@ class ScenarioParser:
         }
 
     def parse(self, text: str, file: str) -> tuple[ScenarioStep, ...]:
-        """Read a whole scenario.
+        """Parse the whole text of a scenario.
+
+        Args:
+            text: content of the scenario file.
+            file: name of the file, for error messages.
 
         Raises:
             StepError: a line is invalid. The message is `FILE:LINE: the text, and what is allowed`.
@@ -218,7 +222,7 @@ def _line_sender(encode: Encoder) -> Sender:
 
 
 def parse_raw(rest: str) -> Send:
-    """Read the argument of `raw`: bytes in hex.
+    """Parse the argument of the scenario verb `raw`: bytes in hex, such as `6f 6b 0a`.
 
     Raises:
         ValueError: the text is not bytes in hex.
@@ -251,13 +255,13 @@ def _parse_end(rest: str) -> ScenarioEnd:
 
 
 class ScenarioPlayer:
-    """Runs a scenario as the time of the emulator advances.
+    """Executes a scenario while the time of its emulator advances.
 
     Args:
         emulator: emulator, which must not have run yet.
-        scenario: the scenario.
+        scenario: steps of the scenario.
         transcript: transcript that receives missed expectations and watched outputs.
-        stays: whether to keep the emulator running if the scenario has no `end`.
+        stays: whether the emulator keeps running if the scenario has no `end`.
 
     Attributes:
         met: number of met expectations.

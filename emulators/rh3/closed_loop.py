@@ -44,20 +44,21 @@ class Mounted:
 
 
 class MountedUrg(Mounted):
-    """A sensor in front of the axle.
+    """An emulated URG range finder mounted on a robot base, in front of the axle.
 
-    Not emulated: the sensor's own robot in its view, and the true outline of other robots (they are
-    seen as round).
+    The sensor moves with the base and sees the surroundings and other robots. Not emulated: the
+    robot's own body in the sensor's view, and the true outline of other robots, which are seen as
+    round.
 
     Args:
         base: base that carries the sensor.
-        world: surroundings of the sensor.
-        others: bases that the sensor sees.
+        world: surroundings that the sensor sees.
+        others: bases of other robots that the sensor sees.
 
     Attributes:
-        urg: the sensor.
-        line: line of the sensor. Its end `b` is the host's end.
-        world: surroundings of the sensor, which may be changed.
+        urg: the emulated sensor.
+        line: serial line of the sensor. Its end `b` is the host's end.
+        world: surroundings that the sensor sees, which may be changed.
     """
 
     def __init__(self, base: Rh3Base, world: World, others: Sequence[Rh3Base] = ()) -> None:
@@ -87,12 +88,12 @@ class _Aboard(Coupling, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Cart:
-    """An emulated base with the components that drive it.
+    """An emulated Reference Hardware 3 base with the RT components that drive it.
 
     Attributes:
         base: the emulated base.
-        chain: components of the cart.
-        port: port of the base, on which faults of the wire are armed.
+        chain: RT components that drive the base.
+        port: port of the base, on which faults of its serial line are armed.
     """
 
     base: Rh3Base

@@ -26,14 +26,14 @@ _WATCHDOG_US: Final = 500_000
 
 
 class OmniCart(RtComponent):
-    """A cart that accepts IIS velocities with all three parts, and writes its true pose.
+    """RT component that emulates a robot on three omni wheels.
 
-    A velocity with NaN means stop.
-
-    Not emulated: a driver and its line, encoders, odometry errors.
+    It follows velocities of the type IIS::TimedVelocity2D with all three parts, forward, left and
+    turning, and writes its true pose. A velocity with NaN means stop. Not emulated: a motor driver
+    and its serial line, encoders, odometry errors.
 
     Attributes:
-        body: the wheels and their pose.
+        body: the emulated wheels and their pose.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("OmniCart", "Robot on three omni wheels, emulated")
@@ -76,18 +76,19 @@ class OmniCart(RtComponent):
 
 
 class MovingControl(RtComponent):
-    """Commands a base by a joystick, and stops the base when the joystick sends nothing.
+    """RT component that drives a base by a joystick, and stops it when the joystick stops sending.
 
-    RefHardRh3 keeps the latest velocity. So if the connector to the joystick were removed while the
-    stick is pushed, the base would go on without this component.
+    The component RefHardRh3 keeps the latest velocity. Without this component the base would
+    therefore go on if the connector to the joystick were removed while the stick is pushed.
 
     Args:
         instance_name: instance name of the component.
-        phase: phase of the common interface: 1 for RTC::TimedVelocity, or 2 for IIS::TimedVelocity.
+        phase: phase of the common interface, which selects the type of the velocities: 1 for
+            RTC::TimedVelocity, or 2 for IIS::TimedVelocity.
 
     Attributes:
-        twist: velocity forward and to the left in m/s, and turning rate in rad/s, or None while no
-            command arrives.
+        twist: latest velocity forward and to the left in m/s, and turning rate in rad/s, or None
+            while no command arrives.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("MovingControl", "Takes IIS velocities, phase 1 or 2")
@@ -145,18 +146,18 @@ class _Robot:
 
 
 class Convoy:
-    """Several robots with poses in one map frame.
+    """Several emulated robots that drive one behind the other, with poses in one map frame.
 
-    The first robot keeps its planner. The other robots follow the commands of the ports that are
-    connected to them.
+    The first robot keeps its planner. Each other robot follows the commands that arrive at its
+    ports.
 
     Args:
-        carts: first poses of the robots on two wheels.
-        omni: first poses of the robots on omni wheels.
-        clock: clock of a convoy in real time. Without a clock the convoy is in virtual time.
+        carts: initial poses of the robots on two wheels.
+        omni: initial poses of the robots on omni wheels.
+        clock: clock of a convoy in real time, or None for virtual time.
 
     Attributes:
-        loop: carts, their lines and the manager.
+        loop: carts, their serial lines and the manager of their RT components.
         robots: all robots. The carts come first.
     """
 

@@ -134,7 +134,7 @@ def _parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
 
 
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
-    """Return the parameters with the given options, and defaults for the other parameters.
+    """Return the parameters of an emulated RH3 base from options; missing options get defaults.
 
     Raises:
         ValueError: an option is invalid. A message about a parameter names its option.

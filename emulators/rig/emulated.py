@@ -11,10 +11,10 @@ from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):
-    """Physical inputs of a device by name, such as an `InputBank`.
+    """Protocol of a device's physical inputs by name, such as an `InputBank`.
 
     Attributes:
-        changed: whether an input was set since the device last checked.
+        changed: whether an input was set since the device last checked its inputs.
     """
 
     changed: bool
@@ -45,7 +45,7 @@ class Inputs(Protocol):
         ...
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if no input has the name and type."""
+        """Return the description of an input; raise ValueError if none has this name and type."""
         ...
 
 
@@ -77,5 +77,8 @@ class Emulated(Device[W], HasSignals, Protocol[W]):
 
 
 def read_signal(device: HasSignals, name: str) -> Setting:
-    """Return the present value of an input or output; raise KeyError if the name is unknown."""
+    """Return the present value of an input or output of a device.
+
+    Raises KeyError if the device has no input or output with this name.
+    """
     return device.inputs[name] if name in device.inputs.table else device.read(name)

@@ -21,7 +21,10 @@ _Entry = tuple[int, int, Hashable, _Action]
 
 
 class EventQueue(Part):
-    """Actions in order of time; actions of the same time are in order of entry."""
+    """Queue of the actions that a rig executes at given times.
+
+    Actions with the same time are executed in the order in which they were added.
+    """
 
     def __init__(self) -> None:
         self._number = 0
@@ -38,7 +41,10 @@ class EventQueue(Part):
         self._note_due()
 
     def wake(self, key: Hashable, t_us: int) -> None:
-        """Make the rig stop at a time for its watchers, like `put` of an empty action."""
+        """Make the rig stop at a time, so that its watchers are called then.
+
+        This is `put` with an action that does nothing.
+        """
         self.put(key, t_us, _nothing)
 
     def __getstate__(self) -> object:

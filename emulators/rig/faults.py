@@ -42,20 +42,20 @@ _MOST: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class FaultArgument(Immutable):
-    """An argument of a fault.
+    """Description of one argument of a fault, such as the argument in `delay=800ms`.
 
     Attributes:
-        name: keyword of the argument, such as `delay` in `delay=800ms`.
+        name: name of the argument, such as `delay`.
         text: description as readable text.
-        default: default value, in the notation of users.
-        unit: unit of the value: `time` for a duration (`low` and `high` in us), or the unit of a
-            whole number, which may be written in hex, or empty for a plain number.
-        low: smallest value.
-        high: largest value.
-        choices: allowed words instead of a number, if any.
-        read: function that reads the text of an argument with a special form. It raises ValueError
-            for an invalid text.
-        bare: whether the argument may be written without its name.
+        default: default value, as a user would write it.
+        unit: unit of the value: `time` for a duration, any other text for the unit of a whole
+            number, which may be written in hex, or empty for a plain number.
+        low: smallest value; for a duration in microseconds.
+        high: largest value; for a duration in microseconds.
+        choices: allowed words, if the value is a word instead of a number.
+        read: function that parses an argument with a special form. It raises ValueError for an
+            invalid text.
+        bare: whether the value may be written without the name of the argument.
     """
 
     name: str
@@ -80,7 +80,9 @@ class FaultArgument(Immutable):
         return f"{self.low} to {self.high} {self.unit}".rstrip()
 
     def parse(self, word: str) -> Any:
-        """Read a value: microseconds of a time, a number, a word, or what `read` returns.
+        """Parse the value of this argument: a time in microseconds, a number or a word.
+
+        If the argument has a function `read`, the value is what `read` returns.
 
         Raises:
             ValueError: the text has a wrong form, or the value is out of range.
@@ -123,14 +125,14 @@ EITHER_WAY: Final = replace(WAY, default="both", bare=False)
 
 @dataclass(frozen=True, slots=True)
 class FaultForm(Immutable):
-    """Notation and description of a fault; entries of fault tables are subclasses.
+    """Description of a fault and its arguments; the entries of fault tables are subclasses.
 
     Attributes:
-        text: description as readable text.
-        rated: whether the fault accepts `rate=` and `count=`.
-        arguments: arguments of the fault itself, in the order in which they are written without
-            keywords, if they are `bare`.
-        usual_rate: default rate.
+        text: description of the fault as readable text.
+        rated: whether the fault accepts the arguments `rate=` and `count=`.
+        arguments: arguments of the fault itself. Values of `bare` arguments may be written without
+            names in this order.
+        usual_rate: default of `rate`.
     """
 
     text: str
@@ -155,12 +157,12 @@ class FaultForm(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class FaultArguments(Immutable):
-    """The arguments after the name of a fault, with all defaults.
+    """Parsed arguments of a fault, including the defaults of arguments that were not given.
 
     Attributes:
-        values: values by name of the argument, as returned by the argument's `parse`.
+        values: parsed values by argument name.
         rate: probability that the fault acts each time it could.
-        count: largest number of actions of the fault, or None for no limit.
+        count: largest number of times that the fault acts, or None for no limit.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -185,12 +187,12 @@ def usage(name: str, form: FaultForm) -> str:
 
 
 def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArguments:
-    """Read the arguments of a fault.
+    """Parse the arguments of a fault, such as `rate=0.1,count=3`.
 
     Args:
-        name: name of the fault, for messages.
-        form: declaration of the fault.
-        words: texts after `NAME=`, split at commas.
+        name: name of the fault, for error messages.
+        form: description of the fault with its arguments.
+        words: the arguments as texts, which are the text after `NAME=` split at commas.
 
     Raises:
         ValueError: an argument is unknown, or a value is out of range.
@@ -352,12 +354,12 @@ def _by_bare_name(name: str, names: Iterable[str]) -> dict[str, str]:
 
 
 def near_fault(name: str, names: Iterable[str], inputs: Iterable[str] = ()) -> str:
-    """Return a suggestion of the probable fault or inputs, or the list of the known faults.
+    """Return a hint for an unknown fault name: a similar fault, an input to set, or all faults.
 
     Args:
         name: the unknown name.
         names: names of the known faults.
-        inputs: names of inputs that can be suggested.
+        inputs: names of inputs that the hint may suggest.
 
     >>> near_fault("overheat", ["cut"], ["load_nm", "ambient_c"])
     "set the input 'load_nm' or 'ambient_c'"
@@ -382,13 +384,13 @@ def _parse_rate(name: str, text: str) -> float:
 
 
 class FaultTally(Copyable):
-    """Counter of the actions of a fault, with a limit.
+    """Counts how often a fault has acted, up to an optional limit.
 
     Args:
-        count: largest number of actions, or None for no limit.
+        count: largest number of times that the fault acts, or None for no limit.
 
     Attributes:
-        acted: number of actions up to now.
+        acted: number of times that the fault has acted.
     """
 
     __slots__ = ("acted", "count")
@@ -409,12 +411,13 @@ class FaultTally(Copyable):
 
 
 class FaultTrigger(Copyable):
-    """Decides by random numbers, rate and count when a fault acts.
+    """Decides at each opportunity whether a fault acts, from its rate, count and random numbers.
 
     Args:
         chance: random generator of the trigger, from which the fault may also draw.
         arguments: arguments of the fault, with rate and count.
-        tally: counter shared by the triggers of a fault that acts in both directions.
+        tally: counter that limits how often the fault acts. A fault of both directions has two
+            triggers with one counter.
     """
 
     __slots__ = ("chance", "tally", "threshold")
@@ -473,10 +476,10 @@ class HoldingFault(ABC, Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class FaultType(FaultForm, Generic[W]):
-    """A fault of a port that can be armed by name.
+    """Type of a wire fault, which can be armed by its name at a port.
 
     Attributes:
-        make: function that builds the fault of one direction from its trigger and its arguments.
+        make: function that makes the fault of one direction from its trigger and its arguments.
         uart_error: error that a UART detects each time the fault acts: `framing`, `parity`,
             `breaks`.
     """
@@ -525,11 +528,11 @@ class FaultyPort(Copyable, Generic[W]):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; it replaces an armed fault of the same name.
+        """Arm a fault at this port, in place of an armed fault with the same name.
 
         Args:
             name: name of the fault.
-            *arguments: texts after `NAME=`, split at commas.
+            *arguments: arguments of the fault as texts, such as `rate=0.1`.
 
         Raises:
             KeyError: no fault has this name.
@@ -564,10 +567,10 @@ class FaultyPort(Copyable, Generic[W]):
         return self._tallies[name].acted if name in self._tallies else 0
 
     def clear(self, name: str) -> None:
-        """Clear a fault; do nothing if the fault is not armed.
+        """End an armed fault; do nothing if the fault is not armed.
 
-        Traffic that a fault only delays still arrives at its time, and no traffic overtakes it.
-        Traffic that another fault holds is lost.
+        Traffic that the fault only delays still arrives at its delayed time, and later traffic does
+        not overtake it. Other traffic that the fault holds back is lost.
         """
         for faults in (self._to_device, self._from_device):
             fault = faults.get(name)
@@ -625,7 +628,7 @@ class FaultyPort(Copyable, Generic[W]):
                 fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device, after the faults have released their held traffic.
+        """Change the UART setting of the device, after the faults have released held traffic.
 
         Args:
             now_us: present time in microseconds.

@@ -46,7 +46,7 @@ def enable(wanted: bool) -> bool:
 
 
 def bits(frame: object) -> int | None:
-    """Return the number of bits of a frame, or None if Python must count them."""
+    """Return the length of a CAN frame in bits, or None if Python must count the bits."""
     counted: int | None = _KERNEL.frame_bits(frame)
     return counted
 
@@ -99,14 +99,17 @@ if TYPE_CHECKING or _KERNEL is None:
         )
 
     def run(rig: object, parts: object, until_us: int, unseen_us: int, host: object, /) -> bool:
-        """Run a rig up to a time in C, as `Rig.run_to` does; return False if more work is left.
+        """Run a rig up to a time in the compiled kernel, as `Rig.run_to` does.
 
         Args:
             rig: the rig.
             parts: timetable, bus, event queue, horizon, watchers, hosts and stations of the rig.
-            until_us: end of the run.
-            unseen_us: time until which no code reads a device.
-            host: end that waits for traffic, or None if there is no such end.
+            until_us: end of the run, in microseconds.
+            unseen_us: time until which no code reads a device, in microseconds.
+            host: end of a wire at which a host waits for traffic, or None if no host waits.
+
+        Returns:
+            False if Python must run the rest.
         """
         return False
 

@@ -12,15 +12,18 @@ from tickrig.wire.uart import UartSetting
 
 
 class Port(Protocol[W]):
-    """One end of a wire. A port never blocks, and gets the time as an argument."""
+    """Protocol of one end of a wire, at which a device or host sends and receives.
+
+    A port never blocks. Its methods get the present time as an argument.
+    """
 
     @property
     def due_us(self) -> int:
-        """Time at which the next traffic will have arrived, or `NEVER` if there is none."""
+        """Time at which the next traffic arrives at this end, or `NEVER` if there is none."""
         ...
 
     def poll(self, now_us: int, /) -> W:
-        """Return the traffic that has arrived by `now_us` since the last call, in wire order."""
+        """Return the traffic that has arrived since the last call by `now_us`, in wire order."""
         ...
 
     def send(self, now_us: int, traffic: W, /) -> None:
@@ -28,19 +31,19 @@ class Port(Protocol[W]):
 
 
 class LineUart(Part):
-    """The setting of the device on a line.
+    """The UART setting of the device on a serial line, with listeners to its changes.
 
     Args:
-        setting: the first setting.
+        setting: the initial setting.
 
     Attributes:
         setting: the setting after the latest change.
-        since_us: time from which the present setting applies.
-        listeners: functions that are called with `since_us` and the new setting. They are copied
-            with the line.
+        since_us: time from which the present setting applies, in microseconds.
+        listeners: functions that are called with `since_us` and the new setting. A copy of the line
+            has them, too.
         error_listeners: functions that are called when a fault has spoiled characters, with the
             direction, the error that a UART detects (`framing`, `parity`, `breaks`), and the number
-            of characters. They are copied with the line.
+            of characters. A copy of the line has them, too.
     """
 
     def __init__(self, setting: UartSetting) -> None:
@@ -75,7 +78,10 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def arrival_us(self, count: int) -> int:
-        """Return the time when `count` bytes will be here, or of the next check, or `NEVER`."""
+        """Return the time at which `count` bytes will have arrived at this end.
+
+        If the time is not known yet, the result is the time to ask again, or `NEVER`.
+        """
         ...
 
     @property
@@ -89,7 +95,10 @@ class ByteEnd(Port[bytes], Protocol):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte will have been sent; past or `NEVER` if it has been."""
+        """Time at which the last byte from this end will have been sent.
+
+        If all bytes have been sent, the time is in the past, or `NEVER`.
+        """
         ...
 
     def unsent(self, now_us: int) -> int:
@@ -101,7 +110,7 @@ class ByteEnd(Port[bytes], Protocol):
 
 
 class ByteLine(Protocol):
-    """An emulated serial line with two ends or more; the device is at the first end."""
+    """Protocol of an emulated serial line with two or more ends; the device is at the first end."""
 
     @property
     def a(self) -> ByteEnd:
@@ -136,7 +145,10 @@ class Wire(Protocol):
         """Advance to `now_us`, and wake the receivers."""
 
     def advance_until_received(self, until_us: int, /) -> bool:
-        """Advance until a station is woken; return False if no station was woken by `until_us`."""
+        """Advance the wire until traffic wakes a station.
+
+        Returns False if no station was woken by `until_us`.
+        """
         ...
 
 

@@ -67,10 +67,10 @@ from tickrig.wire.instant import NEVER, next_tick_us
 
 
 class Coupling(Protocol):
-    """A connection of devices, such as a body on several drives, or a belt between two shafts.
+    """Protocol of a mechanical connection of devices, such as a belt between two shafts.
 
     A coupling acts after all devices of a step have computed. It reads their outputs and may set
-    their inputs, which take effect in the next tick. So a coupling does not depend on the order of
+    their inputs, which take effect in the next tick. So the result does not depend on the order of
     the devices.
     """
 
@@ -137,12 +137,12 @@ class _Wires(Part):
 
     @property
     def only_bus(self) -> Any:
-        """The bus of the only wire, for the kernel, or None if there are several wires."""
+        """The CAN bus of the only wire, for the compiled kernel, or None with several wires."""
         return getattr(self._wires[0], "_kernel_bus", None) if len(self._wires) == 1 else None
 
     @property
     def due_us(self) -> int:
-        """Time at which the next transmission on any wire ends, or `NEVER` if there is none."""
+        """Time at which the next transmission on any wire of the rig ends, or `NEVER`."""
         return min(self._dues())[0] if self._busy else NEVER
 
     def _dues(self) -> list[tuple[int, int]]:
@@ -163,14 +163,16 @@ class _Wires(Part):
             self._wires[place].advance(now_us)
 
     def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
-        """Advance to a time, but stop before a tick for which a station was woken.
+        """Advance all wires to a time, but stop before a tick for which a station was woken.
+
+        Arriving traffic wakes the station that receives it.
 
         Args:
-            until_us: time to which the wires advance at most.
-            hosts: hosts at which arriving traffic also stops the advance.
+            until_us: time to which the wires advance at most, in microseconds.
+            hosts: hosts for which arriving traffic also stops the advance.
 
         Returns:
-            False if no further transmission ends by then and no station was woken.
+            False if no transmission ends by `until_us` and no station was woken.
         """
         if not self._busy:
             return False
@@ -366,13 +368,13 @@ class Rig(Copyable):
         return twin((self, *parts)) if parts else twin(self)
 
     def snapshot(self, *parts: object) -> MachineSnapshot:
-        """Return a snapshot that restores the present state of the rig any number of times.
+        """Return a snapshot that can restore the present state of the rig any number of times.
 
-        The snapshot restores this rig itself, so references to ends of its wires stay valid. A
-        snapshot takes a twentieth of the time of a `fork`.
+        The snapshot restores this rig itself, so references to the ends of its wires stay valid.
+        Making a snapshot takes a twentieth of the time of a `fork`.
 
         Args:
-            parts: objects to restore with the rig, such as a host.
+            parts: further objects that are restored with the rig, such as a host.
 
         Raises:
             TypeError: an object of the rig cannot be restored, such as a pty port.
@@ -397,19 +399,21 @@ class Rig(Copyable):
         return self._timetable.in_step != 0
 
     def move_on(self, wire: Wire) -> None:
-        """Advance a wire with the rig; wires with stations are already included.
+        """Let the rig advance a wire together with its own time.
+
+        Wires on which the rig has a device need no such call.
 
         Args:
-            wire: the wire.
+            wire: wire to advance.
         """
         self._wires.join(wire)
         self._look_for_bus()
 
     @property
     def next_us(self) -> int:
-        """The time of the next event: an action, a tick with work, the end of a transmission.
+        """Time of the rig's next event: an action, a tick with work or an end of a transmission.
 
-        In real time a transmission that ends between two ticks becomes visible at the tick.
+        In real time a transmission that ends between two ticks becomes visible at the next tick.
         """
         self._enter_due()
         planned_us = self._planned_us
@@ -423,13 +427,13 @@ class Rig(Copyable):
             self._wires.advance(self.now_us)
 
     def run_to(self, t_us: int, host: Host | None = None, unseen_us: int = 0) -> None:
-        """Run all events up to a time, inclusive, or until traffic has arrived at a host.
+        """Run the rig up to a time, inclusive, or until traffic has arrived at a host.
 
         Args:
-            t_us: time since the start of the rig.
-            host: the host to watch, if given.
+            t_us: end of the run, in microseconds since the start of the rig.
+            host: host whose traffic ends the run early, or None to run to the end.
             unseen_us: time after `t_us` in which the caller will probably not read devices or set
-                inputs between ticks. The caller may do so, but it is slower.
+                inputs between ticks. If the caller does so nevertheless, the run is only slower.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):
@@ -463,11 +467,11 @@ class Rig(Copyable):
         self.run_to(self.now_us + duration_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int) -> bool:
-        """Run until a condition is true.
+        """Run the rig until a condition is true, or until a time-out.
 
         Args:
             done: function without side effects that returns whether the condition is true.
-            timeout_us: largest duration.
+            timeout_us: longest duration of the run, in microseconds.
 
         Returns:
             True if the condition is true, or False after the time-out.
@@ -600,11 +604,14 @@ class Rig(Copyable):
             watch(now_us)
 
     def late_since(self, t_us: int) -> int:
-        """Return the largest delay of a step since a time; delays up to `_LATE_US` do not count.
+        """Return the largest delay of a step in real time since a given time.
+
+        Delays up to `_LATE_US` do not count.
 
         Args:
-            t_us: time from which late steps are counted. If more than `LATE_KEPT` steps were late
-                since then, all late steps count.
+            t_us: time from which late steps count, in microseconds. Only the last `LATE_KEPT` late
+                steps are stored. If there were more since `t_us`, the result is the largest delay
+                of the whole run.
         """
         if len(self._late) == LATE_KEPT and self._late[0][0] > t_us:
             return self.worst_late_us

@@ -14,7 +14,7 @@ _LOOKING: Final = "receive with a timeout"
 
 
 class SimLink:
-    """A `Link[bytes]` that advances the virtual time while its caller waits.
+    """A host's `Link[bytes]` to an emulated serial line that advances virtual time as it waits.
 
     Args:
         rig: the rig to advance.
@@ -31,10 +31,10 @@ class SimLink:
         return self._rig.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Queue bytes on the line; if its buffer is full, advance the time until the bytes fit.
+        """Send bytes on the line; if its buffer is full, advance the time until the bytes fit.
 
         Args:
-            traffic: the bytes.
+            traffic: bytes to send.
 
         Raises:
             LinkClosed: the link was closed.
@@ -50,17 +50,18 @@ class SimLink:
                 self._rig.run_for(1_000)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Advance the rig until bytes have arrived.
+        """Advance the rig until bytes have arrived, and return the bytes.
 
         Args:
-            timeout_us: longest wait; with 0 the call only polls.
+            timeout_us: longest wait in microseconds. With 0 the method only checks for bytes.
 
         Returns:
             The received bytes, which are empty after the time-out.
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: too many polls at one instant, because the host would wait endlessly.
+            LinkError: the method was called too many times with 0 at the same time of the rig, so
+                that the host would wait endlessly.
         """
         self._check_open()
         rig = self._rig
@@ -85,10 +86,10 @@ class SimLink:
 
 
 class RigClock:
-    """A clock whose time advances with its rig.
+    """Clock for RT components that advances the virtual time of a rig while it waits.
 
-    With this clock a system of RT components (`host.rtc.real_time`) and the emulated devices behind
-    its proxies run in virtual time together.
+    So a system of RT components (`host.rtc.real_time`) and the emulated devices that it drives run
+    in virtual time together.
 
     Args:
         rig: rig that is advanced while the caller waits.

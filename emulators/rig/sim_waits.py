@@ -28,14 +28,14 @@ _T = TypeVar("_T")
 
 
 class OneThread(Copyable):
-    """The thread in which hosts advance the virtual time.
+    """Restricts hosts in virtual time to one thread, which may advance the time.
 
-    If two threads advanced the time, runs would differ. The thread is the one that makes this
-    object; the thread of a twin is the thread that makes the twin.
+    If two threads advanced the time, runs would not be reproducible. The allowed thread is the one
+    that makes this object. For a copy, it is the thread that makes the copy.
 
     Attributes:
-        ident: identifier of the thread.
-        refused: text of the refusal, as soon as a second thread has tried to advance the time.
+        ident: identifier of the allowed thread.
+        refused: error message, once a second thread has tried to advance the time, or empty.
     """
 
     def __init__(self) -> None:
@@ -47,11 +47,11 @@ class OneThread(Copyable):
         self.ident = get_ident()
 
     def refusal(self, name: str, instead: str) -> str:
-        """Return why use is refused (permanently after a second thread has tried it), or "".
+        """Return an error message if a second thread uses an object or has used it, otherwise "".
 
         Args:
-            name: name of the object in use, such as a port or a bus.
-            instead: alternative for hosts with a second thread.
+            name: name of the object that is used, such as a port or a bus.
+            instead: text that suggests what hosts with a second thread can do.
         """
         if get_ident() != self.ident and not self.refused:
             self.refused = (
@@ -63,17 +63,19 @@ class OneThread(Copyable):
 
 
 class Looks(Copyable):
-    """Counter of polls without result at one instant, by which an endless loop is detected."""
+    """Counts polls without result at one instant of virtual time, to detect an endless loop."""
 
     def __init__(self) -> None:
         self._count, self._at_us = 0, NEVER
 
     def refusal(self, now_us: int, instead: str) -> str:
-        """Count a poll; return why the host would wait endlessly, or "".
+        """Count a poll without result, and return an error message if there were too many.
+
+        If there were not, the result is an empty text.
 
         Args:
-            now_us: present time.
-            instead: calls that advance the time.
+            now_us: present time in microseconds.
+            instead: text that suggests calls that advance the time.
         """
         if self._at_us != now_us:
             self._count, self._at_us = 0, now_us
@@ -87,12 +89,12 @@ class Looks(Copyable):
 
 
 class HostLimit(Copyable):
-    """A limit on the waits of hosts; this class sets no limit, its subclass for benches does.
+    """Interface of a limit on the waits of hosts. This class sets no limit, subclasses do.
 
-    Before a host advances the time, it calls `count` if `due_us` has passed.
+    A host that advances the time first calls `count` if `due_us` has passed.
 
     Attributes:
-        due_us: time from which the next wait is counted.
+        due_us: time from which the next wait of a host is counted, in microseconds.
     """
 
     due_us: int = NEVER
@@ -104,11 +106,12 @@ class HostLimit(Copyable):
         """Count a read of the clock."""
 
     def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
-        """Count a wait.
+        """Count a wait of a host.
 
         Args:
-            now_us: the present time.
-            where: function that returns the line that waits. The default is the line of the host.
+            now_us: present time in microseconds.
+            where: function that returns file and line of the waiting code, for the message. The
+                default is the line of the host.
 
         Raises:
             AssertionError: the limit is reached.

@@ -54,16 +54,16 @@ def _too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
 
 
 class RrcPanel(FramedApp):
-    """Stick, buttons, faults and lamps of an RRC and its VR2.
+    """Terminal panel of an emulated RRC and its VR2 wheelchair: stick, buttons, faults and lamps.
 
     A terminal does not report the release of a key. So an arrow key moves the stick and leaves it
-    there, a button key presses the button for 100 ms, and a capital holds a speed button.
+    there, a button key presses the button for 100 ms, and a capital letter holds a speed button.
 
     In a terminal smaller than 80 x 24 the panel has no square for the stick and no frames. The
     smallest size is 60 x 15.
 
     Args:
-        send: function that sends requests to the emulator, and returns its answers.
+        send: function that sends requests to the emulator, and returns the answers of the emulator.
         ready: function that is called when the screen is ready, to start the emulator.
     """
 
@@ -118,7 +118,10 @@ class RrcPanel(FramedApp):
 
     @property
     def helps(self) -> bool:
-        """Whether help is on the screen; Textual's own help does not fit beside the panel."""
+        """Whether the help of the panel is on the screen.
+
+        The panel has its own help, because Textual's help does not fit beside it.
+        """
         return bool(self.screen_stack and self.screen.has_class("-helps"))
 
     def action_show_help_panel(self) -> None:

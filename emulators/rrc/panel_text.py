@@ -48,12 +48,12 @@ _REPORT_US: Final = 100_000
 
 @dataclass(frozen=True, slots=True)
 class PanelView:
-    """The state of the emulator at one time.
+    """State of the emulated RRC at one time, as the terminal panel shows it.
 
     Attributes:
-        values: inputs and outputs by name.
-        status: status of the run.
-        lines: the latest lines on the wire except SA, as `(time, mark, text)`.
+        values: values of inputs and outputs by name.
+        status: status of the run by name.
+        lines: latest lines on the wire except SA, each as `(time, mark, text)`.
         report: latest SA line.
     """
 
@@ -97,10 +97,12 @@ class _WireRow(NamedTuple):
 
 
 class Observer:
-    """Makes a `PanelView` from the answers to `get`, `status` and `lines`.
+    """Keeps the state for the terminal panel, from the emulator's answers to its requests.
+
+    The requests are `get`, `status` and `lines`.
 
     Attributes:
-        view: the present view.
+        view: the present state.
         seen: number of the latest line on the wire. The next request asks for the lines after it.
     """
 
@@ -154,7 +156,7 @@ _STICK_HINTS: Final = {
 
 
 def stick_hint(view: PanelView) -> str:
-    """Return a text of at most 21 columns: whether the stick drives, or why not."""
+    """Return a hint of at most 21 columns for the panel: whether the stick drives, or why not."""
     state = str(view.values.get("state", ""))
     if state == "Standby" and view.number("stick_drives"):
         return "drives"

@@ -44,7 +44,7 @@ def controls_pane(view: PanelView) -> Text:
 
 
 def report_line(view: PanelView) -> Text:
-    """Show the latest SA line, with the counters of speed up, speed down and alarm."""
+    """Return the latest SA line for the panel, with the counters of speed and alarm buttons."""
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(

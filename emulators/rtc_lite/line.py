@@ -88,14 +88,14 @@ _NAMES: Final = {command.value: command.name for command in LiteCommand}
 
 
 class MonitoredLink:
-    """A `Link[bytes]` that reports each frame on another link.
+    """A `Link[bytes]` to an RTC-Lite node that prints each frame in both directions.
 
     Args:
-        link: the link whose frames are reported.
-        show: function that is called with a line of text, such as `> AE EXECUTE`.
+        link: the link that carries the frames.
+        show: function that is called with a line of text for each frame, such as `> AE EXECUTE`.
 
     Attributes:
-        shown: whether frames are reported now.
+        shown: whether frames are printed at present.
     """
 
     def __init__(self, link: Link[bytes], show: Callable[[str], None]) -> None:
@@ -201,15 +201,16 @@ class _LostPing:
 
 @dataclass(frozen=True, slots=True)
 class RadioSettings:
-    """Parameters of a radio link between host and node.
+    """Parameters of an emulated radio link between host and node.
 
     Attributes:
-        latency_us: shortest time that a packet takes.
-        jitter_us: largest random additional time. Packets keep their order.
-        gap_us: silence after which a radio sends the collected bytes as one packet.
-        up_us: mean time from one dropout to the next, or 0 for no dropouts. The time varies
-            randomly by half.
-        dropout_us: mean duration of a dropout, which varies randomly by half.
+        latency_us: shortest delay of a packet, in microseconds.
+        jitter_us: largest random additional delay. Packets keep their order.
+        gap_us: silence after which the radio sends the collected bytes as one packet.
+        up_us: mean time from one dropout to the next, or 0 for no dropouts. The actual time is
+            random, within half of the mean.
+        dropout_us: mean duration of a dropout. The actual duration is random, within half of the
+            mean.
     """
 
     latency_us: int = 15_000
@@ -227,7 +228,10 @@ class _Dropouts:
         self._down, self._until_us = True, 0
 
     def down(self, now_us: int) -> bool:
-        """Return whether there is a dropout at a time; times must not decrease between calls."""
+        """Return whether the radio has a dropout at a time.
+
+        The times must not decrease from call to call.
+        """
         while self._settings.up_us and now_us >= self._until_us:
             self._down = not self._down
             mean_us = self._settings.dropout_us if self._down else self._settings.up_us
@@ -236,7 +240,10 @@ class _Dropouts:
 
 
 class Radio(HoldingFault[bytes]):
-    """One direction of a radio link. Packets are late, lost at random, or lost in a dropout."""
+    """One direction of an emulated radio link, which delays packets and loses some of them.
+
+    A packet is lost at random, or because of a dropout of the link.
+    """
 
     def __init__(
         self, settings: RadioSettings, trigger: FaultTrigger, arguments: FaultArguments
@@ -287,7 +294,10 @@ class Radio(HoldingFault[bytes]):
 
 
 def radio(settings: RadioSettings) -> FaultType[bytes]:
-    """Return a radio link as a fault of a line, armed with the rate at which packets are lost."""
+    """Return a radio link as a fault type that can be armed at a serial line.
+
+    The `rate` of the fault is the probability that a packet is lost.
+    """
     text = "a radio link: packets are late, lost at this rate, and dropouts last seconds"
     return FaultType(text, partial(Radio, settings), usual_rate=0.05)
 

@@ -18,15 +18,15 @@ _LOOK_US: Final = 500_000
 
 
 class HostSetting:
-    """Reports host settings that differ from the device's setting, once for each setting.
+    """Reports a host whose serial setting differs from the device's, once for each such setting.
 
     Args:
         read: function that returns the present setting of the host, such as `9600 8N1`.
-        wanted: setting of the device, or empty if the device understands any host.
-        notify: function that is called with a setting of the host that differs.
+        wanted: setting of the device, or empty if the device accepts any setting of the host.
+        notify: function that is called with each setting of the host that differs.
 
     Attributes:
-        differing: the present setting, if it differs from the device's.
+        differing: the present setting of the host if it differs from the device's, otherwise empty.
     """
 
     def __init__(self, read: Callable[[], str], wanted: str, notify: Callable[[str], None]) -> None:
@@ -36,21 +36,22 @@ class HostSetting:
         self.differing = ""
 
     def want(self, wanted: str) -> None:
-        """Compare hosts with a new setting, after the device has changed its setting.
+        """Compare the host's setting with a new setting of the device from now on.
 
         Args:
-            wanted: setting of the device, or empty if the device understands any host.
+            wanted: new setting of the device, or empty if the device accepts any setting of the
+                host.
         """
         if wanted != self._wanted:
             self._wanted, self._next_us = wanted, 0
             self._notified.clear()
 
     def look(self, now_us: int, *, at_once: bool = False) -> None:
-        """Check whether the host's setting differs: twice a second, or at once.
+        """Check whether the host's setting differs from the device's, at most twice a second.
 
         Args:
             now_us: present time in microseconds.
-            at_once: whether the host has acted.
+            at_once: whether to check even if the last check is recent, because the host has acted.
         """
         if now_us < self._next_us and not at_once:
             return
@@ -93,14 +94,14 @@ class Bridge:
 
     @property
     def due_us(self) -> int:
-        """Time at which all bytes now on the line will have arrived at this end."""
+        """Time at which all bytes that are on the line now will have arrived at this end."""
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Send on the line what hosts outside have written since the last poll.
+        """Put on the emulated line what hosts outside have written since the last poll.
 
-        The data may have been written at any time since the last poll. They count as written right
-        after the last poll, so a host loses no tick by the polling.
+        The hosts may have written at any time since the last poll. Their data are sent as if
+        written right after the last poll, so that polling does not delay them by a tick.
         """
         if self._pending:
             self._attend(now_us)
@@ -127,10 +128,10 @@ class Bridge:
 
 
 class HostEnd:
-    """A `ByteEnd` that reports its traffic.
+    """Wrapper of a host's end of a serial line that reports the bytes the host sends and receives.
 
     Args:
-        end: the end whose traffic is reported.
+        end: the wrapped end.
         hear: function that is called with the time, the direction and the bytes.
     """
 
@@ -157,7 +158,10 @@ class HostEnd:
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return the time when `count` bytes will be here, or of the next check, or `NEVER`."""
+        """Return the time at which `count` bytes will have arrived at this end.
+
+        If the time is not known yet, the result is the time to ask again, or `NEVER`.
+        """
         return self._end.arrival_us(count)
 
     @property
@@ -184,7 +188,10 @@ class HostEnd:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte of the host will have been sent; past or `NEVER` if it is."""
+        """Time at which the last byte of the host will have been sent.
+
+        If all bytes have been sent, the time is in the past, or `NEVER`.
+        """
         return self._end.sent_us
 
     def unsent(self, now_us: int) -> int:
@@ -208,12 +215,13 @@ class HostEnd:
 
 
 class Tap(Copyable, Generic[W]):
-    """A port with listeners; polled data go to the device, and sent data come from the device.
+    """Wrapper of a port that reports all its traffic to listeners.
 
-    The port may be the device's end of a wire, or the port of the host. A twin has no listeners.
+    The port may be the device's end of a wire, or the port of the host. Polled data go to the
+    device, and sent data come from the device. A copy has no listeners.
 
     Args:
-        port: the port.
+        port: the wrapped port.
         listeners: functions that are called with the time, the direction and the traffic.
     """
 
@@ -240,7 +248,10 @@ class Tap(Copyable, Generic[W]):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the line will have sent the data, or `NEVER` if it has or if unknown."""
+        """Time at which the line will have sent all data of this port.
+
+        It is `NEVER` if the data have been sent, or if the time is unknown.
+        """
         return getattr(self._port, "sent_us", NEVER)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:

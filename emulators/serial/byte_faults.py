@@ -58,10 +58,10 @@ def _units(by: str, data: bytes) -> list[bytes]:
 
 @dataclass(slots=True)
 class ByteFault:
-    """A fault that hits bits, bytes, lines or frames at random.
+    """A wire fault that acts on random bits, bytes, lines or frames of a serial line.
 
     Attributes:
-        trigger: trigger that decides which bits, bytes, lines or frames the fault hits.
+        trigger: trigger that decides which bits, bytes, lines or frames are affected.
         arguments: arguments of the fault.
     """
 
@@ -222,7 +222,11 @@ class _Late(ByteFault, HoldingFault[bytes]):
         self._queue, self._free_us = other._queue, other._free_us
 
     def sent(self, until_us: int) -> None:
-        """Start the pauses from the time at which the line has sent the latest bytes."""
+        """Start the next pause of the fault not before the line has sent the latest bytes.
+
+        Args:
+            until_us: time at which the last byte has been sent, in microseconds.
+        """
         self._free_us = max(self._free_us, until_us)
 
     @abstractmethod

@@ -38,7 +38,7 @@ class LineOutside(Port[bytes], Protocol):
         ...
 
     def attend(self, now_us: int, /) -> None:
-        """Handle hosts that connect or leave, without reading from them: the line has no room."""
+        """Accept and drop connections of hosts, without reading because the line is full."""
 
     def device_uses(self, setting: UartSetting, /) -> None:
         """Store the present setting of the device."""
@@ -46,16 +46,16 @@ class LineOutside(Port[bytes], Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """Parameters of the serial line of a device type.
+    """Parameters of the serial line that belongs to a device type.
 
     Attributes:
         baud: bit rate in bit/s.
-        faults: wire faults that can be armed.
-        splitter: function that makes the splitter of one direction for the log. The default is a
-            splitter into lines.
+        faults: wire faults that can be armed on the line, by name.
+        splitter: function that makes, for each direction, the object that splits bytes into lines
+            or frames for the log. The default splits at the ends of lines.
         wire: function that makes the line for a baud rate.
-        uart: whether the device has a UART. A device on USB has no UART and understands a host of
-            any setting.
+        uart: whether the device has a UART. A device on USB has no UART, and so accepts any setting
+            of the host.
     """
 
     baud: int = 115_200
@@ -66,21 +66,22 @@ class LineSettings:
 
 
 class Emulator(RunningEmulator):
-    """A device, its line, its operator, and a rig that runs them.
+    """An emulated serial device with its line, its operator, and a rig that runs them.
 
     Args:
         name: name of the device.
         device: the device.
-        outside: port of the host. Without a port the caller is the host (`send`, `log`).
+        outside: port at which the host is connected, such as a pty. Without it the caller is the
+            host (`send`, `log`).
         clock: clock of the rig, or None to use a `VirtualClock`.
         seed: seed of random wire faults.
-        trace: the recording.
-        link: path for the host, as text.
+        trace: file that records the run, or None to record nothing.
+        link: path at which the host finds the device, as text.
         line: parameters of the line.
 
     Attributes:
-        line: the line itself.
-        host_end: caller's end of the line, also for a `SimLink`. Its traffic is logged.
+        line: the serial line.
+        host_end: end of the line for the caller, also for a `SimLink`. Its traffic is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -145,13 +146,13 @@ class Emulator(RunningEmulator):
 
 
 class SerialHub(NonCopyable):
-    """Ports on one line; each port receives everything that the device sends, and may send.
+    """Connects several hosts with one emulated serial line, each through its own port.
 
-    If several hosts send at the same time, their data arrive mixed, in pieces of one poll. Hosts do
-    not receive each other's data.
+    Each port receives everything that the device sends, and may send. If several hosts send at the
+    same time, their data arrive mixed. Hosts do not receive each other's data.
 
     Args:
-        ports: the ports, a pty and network ports.
+        ports: ports of the hosts: a pty and network ports.
     """
 
     why_not_copied = "its ports belong to this machine"

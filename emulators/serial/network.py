@@ -69,10 +69,10 @@ _LOOPBACK: Final = "127.0.0.1"
 
 @dataclass(frozen=True, slots=True)
 class ServeUrl:
-    """An address to listen at, and its protocol.
+    """Network address at which an emulated serial line is served to hosts, with the protocol.
 
     Attributes:
-        scheme: `rfc2217`, or `socket` for plain bytes of the line.
+        scheme: protocol: `rfc2217`, or `socket` for plain bytes of the line.
         host: name or address of this machine. An IPv6 address has no brackets.
         port: TCP port, or 0 to let the system select a port.
     """
@@ -88,7 +88,7 @@ class ServeUrl:
 
 
 def parse_serve_url(text: str) -> ServeUrl:
-    """Read the address at which to serve a line.
+    """Parse the address at which a serial line is to be served.
 
     Args:
         text: address as `SCHEME://[HOST:]PORT`. Without a host only this machine can connect.
@@ -122,7 +122,7 @@ _DISCARDED_BYTES: Final = 65_536
 
 
 class DismissedHost:
-    """A refused host, which has a second to read the reason.
+    """Connection to a refused host, which stays open for a second so that the host can read why.
 
     If a connection is closed while its host still sends, the connection is reset. Some systems then
     drop data that the host has not read yet. So data from a refused host are read and dropped.
@@ -201,11 +201,15 @@ class HostConnection:
 
     @property
     def setting(self) -> UartSetting | None:
-        """The port setting of the host, or None if the host cannot set the port."""
+        """The port setting that this host has requested, or None if it cannot set the port."""
         return None
 
     def has_ended(self, now_us: int) -> bool:
-        """Whether another host may get the line: this host has stopped sending, or is stuck."""
+        """Return whether the line is free for another host.
+
+        That is the case if this host has stopped sending, or does not read its data for a long
+        time.
+        """
         stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US
         return self.over or stuck or self._last_words_us is not None
 
@@ -219,7 +223,10 @@ class HostConnection:
         return data
 
     def hold(self, now_us: int) -> None:
-        """Negotiate with the host while another host has the line, and hold part of the data."""
+        """Negotiate with a host that waits until another host leaves the line, and hold its data.
+
+        Only the first part of its data is read and held.
+        """
         if len(self._held) < READ_BYTES and not self.has_ended(now_us):
             self._held += self._look(now_us)
         self.over |= self.has_ended(now_us) and not self._held  # it has not waited
@@ -332,7 +339,7 @@ class _QuietAdapter(SerialBase):
     cts = dsr = ri = cd = False
 
     def reset_input_buffer(self) -> None:
-        """Do nothing: data of the device are in transit to the host, which drops them."""
+        """Do nothing. pyserial calls this to purge received data, but here the host drops them."""
 
     def reset_output_buffer(self) -> None:
         """Do nothing: earlier data are already on the line."""
@@ -372,11 +379,12 @@ class _SafePortManager(PortManager):
 
 
 class Rfc2217Connection(HostConnection):
-    """A host that may set the port, as on a serial server, such as pyserial's `rfc2217://`.
+    """Connection to a host that may set the serial port by RFC 2217.
 
-    The host's settings are answered and stored; the device keeps its own setting. DTR, RTS and
-    break of the host have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet
-    data is dropped.
+    An example of such a host is pyserial's `rfc2217://`. Settings that the host requests are
+    acknowledged and stored, but the device keeps its own setting. DTR, RTS and break of the host
+    have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet data is
+    disconnected.
 
     Not emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
 
@@ -498,26 +506,31 @@ class NetworkPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or as the device's."""
+        """The setting of the host, such as `9600 8N1`, if it differs from the device's.
+
+        Otherwise, or if the setting is unknown, the text is empty.
+        """
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set the port like the device, and report hosts that change it; see `HostSetting`.
+        """Set the port like the device, and report each host that requests another setting.
 
         Args:
             baud: bit rate of the device in bit/s, with 8N1. A rate above 4 Mbit/s is not checked.
-            notify: function that is called with a different setting, such as `9600 8N1`.
+            notify: function that is called with each setting that differs, such as `9600 8N1`.
         """
         self._uart = UartSetting(baud)
         if baud <= _MAX_BAUD:
             self._setting = HostSetting(self._shown_setting, str(self._uart), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Sample the data between the device and a host with another setting, as UARTs would do.
+        """Follow a new setting of the device: a host with another setting now gets garbled data.
+
+        The data are those that UARTs with the two settings would receive.
 
         Args:
-            setting: setting of the device. If the rate is above 4 Mbit/s, the device understands a
-                host of any setting.
+            setting: new setting of the device. If the rate is above 4 Mbit/s, the device
+                understands a host of any setting.
         """
         self._uart, self._samples = setting, setting.baud <= _MAX_BAUD
         if self._setting is not None:
@@ -539,9 +552,9 @@ class NetworkPort(NonCopyable):
         return data
 
     def attend(self, now_us: int, /) -> None:
-        """Accept and close connections, and send buffered data to hosts, without reading.
+        """Accept and close connections, and send buffered data to hosts, but read nothing.
 
-        The bridge calls this method instead of a poll while the line has no room for earlier data.
+        The bridge calls this method instead of `poll` while the emulated line is full.
         """
         if self._host is not None:
             self._host.flush(now_us)

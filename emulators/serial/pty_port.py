@@ -231,16 +231,19 @@ class PtyPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or as the device's."""
+        """The setting of the host, such as `9600 8N1`, if it differs from the device's.
+
+        Otherwise, or if the setting is unknown, the text is empty.
+        """
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set the port like the device, and report hosts that change it; see `HostSetting`.
+        """Set the pty to the device's setting, and report each host that selects another setting.
 
         Args:
             baud: bit rate of the device in bit/s, with 8N1. A rate without a termios name is not
                 checked.
-            notify: function that is called with a different setting, such as `9600 8N1`.
+            notify: function that is called with each setting that differs, such as `9600 8N1`.
         """
         codes = [code for code, rate in _BAUDS.items() if rate == baud]
         if not codes:
@@ -251,10 +254,13 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Compare hosts with the setting of the device; a pty passes all bytes unchanged.
+        """Compare hosts with a new setting of the device from now on.
+
+        The bytes are not changed, because a pty transmits without a bit rate.
 
         Args:
-            setting: setting of the device. A pty shows 8 data bits, and even parity as no parity.
+            setting: new setting of the device. A pty shows 8 data bits, and even parity as no
+                parity.
         """
         if self._setting is not None:
             parity = "O" if setting.parity == "O" else "N"

@@ -91,16 +91,18 @@ class Rs485Line(Copyable):
         return self.ends[1]
 
     def put(self, sender: Rs485End, now_us: int, start_us: int, data: bytes) -> int:
-        """Send bytes on the wires back to back; an end calls this.
+        """Send bytes of a station on the RS485 line, without gaps between them.
+
+        The ends of the line call this method.
 
         Args:
             sender: end that sends the bytes.
             now_us: present time in microseconds.
             start_us: start of the first byte.
-            data: the bytes.
+            data: bytes to send.
 
         Returns:
-            The time at which the last byte has passed, in us.
+            The time at which the last byte has passed, in microseconds.
         """
         # A burst is cut at whole microseconds once, at its end; single bytes are worked out
         # from its start.
@@ -118,14 +120,14 @@ class Rs485Line(Copyable):
         return end_us
 
     def cut(self, sender: Rs485End, now_us: int) -> int:
-        """Remove the bytes of which no bit is on the wires yet.
+        """Discard bytes that a station has queued, except those that have begun to be sent.
 
         Args:
-            sender: sender of the bytes.
+            sender: end of the station.
             now_us: present time in microseconds.
 
         Returns:
-            The time at which the byte in transit has passed, in us.
+            The time at which the byte in transit has passed, in microseconds.
         """
         end_us = now_us
         for burst in self._air:
@@ -140,25 +142,25 @@ class Rs485Line(Copyable):
         return end_us
 
     def after(self, count: int) -> int:
-        """Compute the duration of bytes on the wires.
+        """Return how long bytes take on the line.
 
         Args:
             count: number of bytes.
 
         Returns:
-            The duration in us, rounded up.
+            The duration in microseconds, rounded up.
         """
         return -(-count * self._byte_cost // self._baud)
 
     def passed(self, burst: _Burst, now_us: int) -> int:
-        """Compute how many bytes of a burst a receiver can get.
+        """Return how many bytes of a burst have arrived at a receiver.
 
         Args:
-            burst: burst of bytes sent back to back.
+            burst: bytes sent without gaps.
             now_us: present time in microseconds.
 
         Returns:
-            The number of bytes, including the bytes already taken.
+            The number of bytes since the start of the burst, including those already read.
         """
         if now_us >= burst.end_us:
             return len(burst.data)
@@ -167,22 +169,22 @@ class Rs485Line(Copyable):
         return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
 
     def arrival_us(self, burst: _Burst, taken: int) -> int:
-        """Compute the time at which a receiver can get more bytes of a burst.
+        """Return the time at which a receiver can read more bytes of a burst.
 
         Args:
-            burst: burst of bytes sent back to back.
-            taken: number of bytes taken.
+            burst: bytes sent without gaps.
+            taken: number of bytes that the receiver has already read.
 
         Returns:
-            The time in us.
+            The time in microseconds.
         """
         return burst.end_us if self._bursts else burst.start_us + self.after(taken + 1)
 
     def unsent(self, duration_us: int) -> int:
-        """Compute how many bytes are still to be sent.
+        """Return how many bytes a busy sender has still to send.
 
         Args:
-            duration_us: remaining time for which the sender is busy.
+            duration_us: remaining time for which the sender is busy, in microseconds.
 
         Returns:
             The number of bytes, rounded up.
@@ -206,7 +208,7 @@ class Rs485Line(Copyable):
 
 
 class Rs485End:
-    """One station's end of an `Rs485Line`; a `Port[bytes]`.
+    """The end of an RS485 line at which one station sends and receives.
 
     Attributes:
         lost: number of bytes lost because the buffer or the queue of this end was full.
@@ -247,7 +249,10 @@ class Rs485End:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte of this end will have been sent; past if it has been."""
+        """Time at which the last byte of this end will have been sent.
+
+        If all bytes have been sent, the time is in the past.
+        """
         return self._busy_us
 
     def unsent(self, now_us: int) -> int:

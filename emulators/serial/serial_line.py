@@ -90,7 +90,7 @@ class LineEnd(Part):
         self._in, self._out, self.uart = incoming, outgoing, uart
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at this end, after the last stop bit that it has sent.
+        """Change the UART setting of the device at this end, after the last byte that it has sent.
 
         Args:
             now_us: present time in microseconds.
@@ -108,13 +108,13 @@ class LineEnd(Part):
             listener(since_us, setting)
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Remove the bytes sent from here that have not arrived.
+        """Take back the bytes that this end has sent and that have not arrived yet.
 
         Args:
             now_us: present time in microseconds.
 
         Returns:
-            The start of the start bit in ps and the value of each byte.
+            For each byte the start of its start bit in picoseconds, and its value.
         """
         return self._out.withdraw(now_us)
 
@@ -134,7 +134,10 @@ class LineEnd(Part):
         return self._in.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return the time at which `count` bytes, or all bytes in transit, will have arrived."""
+        """Return the time at which `count` bytes will have arrived at this end.
+
+        If fewer bytes are in transit, it is the time at which all of them will have arrived.
+        """
         return self._in.arrival_us(count)
 
     @property
@@ -148,7 +151,10 @@ class LineEnd(Part):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte will have been sent; past or `NEVER` if it has been."""
+        """Time at which the last byte of this end will have been sent.
+
+        If all bytes have been sent, the time is in the past, or `NEVER`.
+        """
         return self._out.last_us
 
     def unsent(self, now_us: int) -> int:

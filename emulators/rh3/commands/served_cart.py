@@ -35,11 +35,11 @@ _NOT_HERE: Final = ("create", "delete", "save")
 
 
 class CartClock(ServingClock):
-    """Real-time clock that serves requests while it waits, and counts late ticks.
+    """Real-time clock of a served cart: it serves requests while it waits, and counts delays.
 
     Attributes:
         late_ticks: number of waits that started more than `LATE_US` late.
-        worst_late_us: largest delay of these waits.
+        worst_late_us: largest delay of a wait, in microseconds.
     """
 
     late_ticks = 0
@@ -54,16 +54,16 @@ class CartClock(ServingClock):
 
 
 class ServedCart:
-    """Advances a cart until it is stopped, and serves requests while it waits.
+    """Runs a cart in real time until it is stopped, and serves requests between its periods.
 
     Args:
-        connection: the cart, with its components.
-        clock: clock for waiting.
+        connection: connection to the base of the cart, with the RT components.
+        clock: clock that waits for each period.
 
     Attributes:
-        running: whether the cart runs, which is false once `stop` was called.
-        after_tick: functions that are called with the time in us after each period.
-        server: control socket, or None without a control socket.
+        running: whether the cart runs, which is false after `stop` was called.
+        after_tick: functions that are called after each period, with the time in microseconds.
+        server: server of the control socket, or None without a control socket.
     """
 
     def __init__(self, connection: BaseConnection, clock: CartClock) -> None:
@@ -101,10 +101,13 @@ class ServedCart:
 
 
 class CartControl(SystemControl):
-    """Answers requests about a cart: requests of a system, and commands of PositionInput.
+    """Answers requests to a running cart: goals, paths, and the requests of any RT system.
+
+    Goals and paths are commands of the component PositionInput.
 
     Args:
-        connection: the cart. It must not be advanced while a request is answered.
+        connection: connection to the base, with the RT components. It must not be advanced while a
+            request is answered.
         cart: object that advances the cart.
     """
 
@@ -160,8 +163,8 @@ def _pose(value: object, least: int) -> Pose:
 def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | None = None) -> None:
     """Run a cart until Ctrl-C or until a peer ends the run, then deactivate its components.
 
-    Lines typed on standard input are commands of PositionInput. When standard input ends and
-    no other program can reach the cart, the run ends after the last command.
+    Lines typed on standard input are commands of the component PositionInput. When standard input
+    ends and no other program can reach the cart, the run ends after the last command.
 
     If velocities come from a topic, the cart follows them while no command of PositionInput runs.
 

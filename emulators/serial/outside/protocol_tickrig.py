@@ -8,11 +8,12 @@ from tickrig.emulators.serial.outside.sim_serial import SimSerial
 
 
 class Serial(SimSerial):
-    """The port of a URL, which `serial.serial_for_url` makes.
+    """pyserial port for a URL `tickrig://NAME`, which `serial.serial_for_url` opens.
 
     The name in the URL is looked up when the port is opened. As with any pyserial port, the default
     setting is 9600 8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects
-    the effect of a different setting. Without it, the code that offers the name selects the effect.
+    what happens if the settings of port and device differ. Without it, the code that offers the
+    name selects this.
 
     Args:
         port: URL, which is opened at once, or None to open the port later.

@@ -41,7 +41,7 @@ class _SerialPorts:
 
     @contextmanager
     def offer(self, name: str, side: SerialSide) -> Iterator[SerialSide]:
-        """Allow a line to be opened as `tickrig://NAME`, for the duration of a `with` block.
+        """Make an emulated line available to pyserial as `tickrig://NAME`, during a `with` block.
 
         Args:
             name: name that is valid in a URL: without `?`, `#` and spaces. pyserial keeps upper and
@@ -66,7 +66,7 @@ class _SerialPorts:
             del self._sides[name]
 
     def find(self, url: str) -> tuple[SerialSide, Mismatch | None]:
-        """Return the host's side of a line, and the `mismatch` of the URL.
+        """Return the emulated line that a `tickrig://` URL names, and its option `mismatch`.
 
         Args:
             url: URL such as `tickrig://rrc?mismatch=refuse`.

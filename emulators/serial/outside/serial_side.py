@@ -30,7 +30,9 @@ def _ignore(now_us: int) -> None:
 
 @dataclass(slots=True)
 class UartErrors:
-    """Counters of characters with errors, each counted once, as in Linux (`TIOCGICOUNT`).
+    """Counters of received characters with errors, as Linux counts them (`TIOCGICOUNT`).
+
+    A character with several errors is counted once.
 
     Attributes:
         framing: number of characters with a 0 in place of a stop bit.
@@ -82,7 +84,7 @@ class ModemLines(Copyable):
 
     @property
     def cts(self) -> bool:
-        """Clear To Send, read by the host; a port with `rtscts` sends only while CTS is on."""
+        """State of the signal Clear To Send. A port with `rtscts` sends only while it is on."""
         return self._cts
 
     @cts.setter
@@ -96,16 +98,17 @@ class ModemLines(Copyable):
 
 
 class HostReceiver(Copyable):
-    """Receives bytes of a device from a line, sampled by a UART with the host's setting.
+    """Receiving UART of a host: samples the bytes of an emulated line with the host's setting.
 
-    If the host's setting differs from the device's, a character may end within a byte of the
-    device. The character is available when that byte has passed. A character with an error is
-    delivered like any other character and counted, as Linux and Windows do for pyserial.
+    If the settings of host and device differ, a character of the host may end within a byte of the
+    device. Such a character becomes available when that byte has passed. A character with an error
+    is delivered like any other character and counted, as Linux and Windows do for pyserial.
 
     Args:
         end: the host's end of the line.
         device: setting of the device.
-        garbled: function that is called with the time when bytes of another setting are sampled.
+        garbled: function that is called, with the time, when bytes are sampled with a different
+            setting.
 
     Attributes:
         errors: counters of characters with errors.
@@ -121,7 +124,7 @@ class HostReceiver(Copyable):
         self._received: deque[Character] = deque()
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Change the setting with which the device sends; the host's setting is unchanged.
+        """Receive the bytes that the device sends with its new setting; the host's setting stays.
 
         Args:
             device: new setting of the device.
@@ -136,11 +139,12 @@ class HostReceiver(Copyable):
         self._device = device
 
     def use(self, setting: UartSetting, now_us: int) -> None:
-        """Receive with a setting from now on; a partly received character is lost.
+        """Change the host's setting for receiving; a partly received character is lost.
 
         Args:
-            setting: setting of the host.
-            now_us: present time, by which all earlier characters have been read.
+            setting: new setting of the host.
+            now_us: present time in microseconds. All characters that arrived earlier have been
+                read.
         """
         same, self._setting = setting == self._device, setting
         self._uart = None if same else UartReceiver(setting, now_us * PS_PER_US)
@@ -164,7 +168,9 @@ class HostReceiver(Copyable):
         return self._end.coming if self._uart is None else b""
 
     def arrival_us(self, count: int) -> int:
-        """Return the time at which `count` characters will be available, or of the next check.
+        """Return the time at which the host can read `count` characters.
+
+        If the time is not known yet, the result is the time to ask again.
 
         Args:
             count: number of characters, at least 1.
@@ -266,7 +272,10 @@ class HostTransmitter(Copyable):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte will have been sent; `NEVER` while bytes are held."""
+        """Time at which the host's last byte will have been sent.
+
+        It is `NEVER` while bytes are held back by flow control.
+        """
         if self.held:
             return NEVER
         sampled_us, line_us = -(-self._free_ps // PS_PER_US), self._end.sent_us
@@ -285,14 +294,14 @@ class HostTransmitter(Copyable):
         self._free_ps = self._begun_ps
 
     def send(self, now_us: int, data: bytes) -> int:
-        """Send bytes after the bytes that are being sent.
+        """Send bytes of the host, after the bytes that are still being sent.
 
         Args:
             now_us: present time in microseconds.
-            data: the bytes.
+            data: bytes to send.
 
         Returns:
-            The number of accepted bytes.
+            The number of accepted bytes, which is smaller if the buffer is full.
         """
         data = data[: self.room(now_us)]
         if self._holds:
@@ -304,9 +313,10 @@ class HostTransmitter(Copyable):
         return len(data)
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Change the setting with which the device receives.
+        """Change the setting with which the device receives the host's bytes.
 
-        The device loses a partly received character. Bytes in transit are sampled.
+        The device loses a partly received character. Bytes on the way are sampled with the new
+        setting.
 
         Args:
             device: new setting of the device.
@@ -323,7 +333,9 @@ class HostTransmitter(Copyable):
         self._advance(now_us)
 
     def release(self, now_us: int) -> None:
-        """Send the held bytes, unless the output is suspended or still waits for CTS.
+        """Send the bytes held back by flow control, if the host may send now.
+
+        The host may not send while its output is suspended or while it waits for CTS.
 
         Args:
             now_us: present time in microseconds.
@@ -354,11 +366,11 @@ class HostTransmitter(Copyable):
         self._advance(now_us)
 
     def set_break(self, now_us: int, *, on: bool) -> None:
-        """Start or end a break, with the line at 0.
+        """Start or end a break, during which the line is held at 0.
 
         Args:
             now_us: present time in microseconds.
-            on: whether there is a break.
+            on: true to start the break, false to end it.
         """
         self._advance(now_us)
         self._break_us = now_us if on else NEVER
@@ -431,10 +443,12 @@ _LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
 
 class HostWaits(Copyable):
-    """Steps a rig while a host waits, but only in the thread that made this object.
+    """Advances a rig while a host waits at a pyserial port.
+
+    Only the thread that made this object may wait.
 
     Args:
-        rig: rig with the line.
+        rig: rig with the emulated line.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -443,10 +457,10 @@ class HostWaits(Copyable):
         self._looks = Looks()
 
     def check_thread(self, name: str) -> None:
-        """Raise SerialException, permanently, if a second thread uses a port.
+        """Raise SerialException if a second thread uses a port. All later calls then raise it, too.
 
         Args:
-            name: name of the port.
+            name: name of the port, for the message.
         """
         if threading.current_thread().name.startswith("asyncio"):  # of an event loop's executor
             raise SerialException(f"{name}: {NO_ASYNCIO}")
@@ -454,7 +468,9 @@ class HostWaits(Copyable):
             raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
-        """Return the end of a timeout that starts now, or the time for `give_up` without a timeout.
+        """Return the time at which a timeout ends that starts now, in microseconds.
+
+        Without a timeout it is the time at which `give_up` ends an endless wait.
 
         Args:
             timeout_s: timeout in seconds, or None for no timeout.
@@ -462,7 +478,10 @@ class HostWaits(Copyable):
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
     def give_up(self, timeout_s: float | None) -> None:
-        """Raise SerialException if there was no timeout, because the host would wait endlessly.
+        """Raise SerialException if a wait without timeout has ended without result.
+
+        Otherwise the host would wait endlessly. After a wait with a timeout this method does
+        nothing.
 
         Args:
             timeout_s: expired timeout in seconds, or None if there was no timeout.
@@ -471,11 +490,10 @@ class HostWaits(Copyable):
             raise SerialException("nothing came for an hour, and no timeout was given")
 
     def look(self) -> None:
-        """Count a poll without result.
+        """Count a read that returned nothing, to detect a host that polls endlessly.
 
         Raises:
-            SerialException: there were too many polls at one instant, so that the host would wait
-                endlessly.
+            SerialException: there were too many such reads at one instant of virtual time.
         """
         if refusal := self._looks.refusal(self.rig.now_us, _LOOKING):
             raise SerialException(refusal)
@@ -483,12 +501,12 @@ class HostWaits(Copyable):
     def wait(
         self, until_us: int, due_us: Callable[[], int], done: Callable[[], bool] = lambda: False
     ) -> None:
-        """Advance the time until an event is due.
+        """Advance the virtual time until an event is due.
 
         Args:
-            until_us: latest end of the wait.
-            due_us: function that returns the time of the event, or `NEVER` if unknown.
-            done: function that returns whether to end the wait at once.
+            until_us: latest end of the wait, in microseconds.
+            due_us: function that returns the time of the event, or `NEVER` if the time is unknown.
+            done: function that returns true to end the wait at once.
         """
         rig = self.rig
         if rig.now_us >= rig.host_limit.due_us:

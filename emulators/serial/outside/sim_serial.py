@@ -65,7 +65,7 @@ class _SimPort(SerialBase):
         return twin(self, memo)
 
     def open(self) -> None:
-        """Open the port, set DTR and RTS on, and discard earlier input.
+        """Open the port, switch DTR and RTS on, and discard earlier input.
 
         Raises:
             SerialException: the port is already open, another port is open on the line, or the
@@ -90,7 +90,7 @@ class _SimPort(SerialBase):
         self.reset_input_buffer()
 
     def close(self) -> None:
-        """Close the port. DTR and RTS go off, a break ends, and sent data still arrive."""
+        """Close the port. DTR and RTS go off, a break ends, and bytes already sent still arrive."""
         if not self.is_open or self.side is None:
             return
         self.is_open = self.side.in_use = False
@@ -170,20 +170,20 @@ class _SimPort(SerialBase):
         return side.modem_lines
 
     def set_output_flow_control(self, enable: bool = True) -> None:
-        """Suspend or resume the output; data written while suspended are held.
+        """Suspend or resume sending. Bytes written while it is suspended are sent later.
 
         Args:
-            enable: whether to send.
+            enable: true to send, false to suspend.
         """
         side = self._side()
         side.transmitter.suspended = not enable
         side.transmitter.release(side.rig.now_us)
 
     def set_input_flow_control(self, enable: bool = True) -> None:
-        """Send XON or XOFF to the device.
+        """Send XON or XOFF to the device, so that it resumes or pauses sending.
 
         Args:
-            enable: whether to send XON. If false, XOFF is sent.
+            enable: true to send XON, false to send XOFF.
         """
         side = self._side()
         side.transmitter.send(side.rig.now_us, XON if enable else XOFF)
@@ -260,10 +260,10 @@ class SimSerial(_SimPort):
         self.open()
 
     def open(self) -> None:
-        """Open the port, on its own line or on the line of a `tickrig://` URL.
+        """Open the port, on the line of its rig or on the line that a `tickrig://` URL names.
 
         Raises:
-            SerialException: no rig offers the name; see `_SimPort.open`.
+            SerialException: no rig offers the name; or for the reasons of `_SimPort.open`.
         """
         own_name, own_side = self._own
         if not self.is_open and self.port is not None:
@@ -293,7 +293,7 @@ class SimSerial(_SimPort):
         return len(self._input)
 
     def read(self, size: int = 1) -> bytes:
-        """Read bytes; time advances until they have arrived or the timeout has expired.
+        """Read bytes. The virtual time advances until they have arrived or the timeout has expired.
 
         Args:
             size: largest number of bytes.
@@ -332,7 +332,7 @@ class SimSerial(_SimPort):
         return bytes(data)
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Read until the end of a line; the timeout applies to each byte.
+        """Read a line up to its line feed; the timeout applies to each byte, as in pyserial.
 
         Args:
             size: largest number of bytes, or -1 for any number.
@@ -352,11 +352,11 @@ class SimSerial(_SimPort):
         return super().readline()
 
     def read_until(self, expected: bytes | str = LF, size: int | None = None) -> bytes:
-        """Read until a sequence has arrived or the timeout has expired.
+        """Read bytes until a sequence has arrived or the timeout has expired.
 
         Args:
-            expected: sequence of bytes. A text never matches, as with pyserial.
-            size: largest number of bytes.
+            expected: sequence of bytes that ends the read. A `str` never matches, as with pyserial.
+            size: largest number of bytes, or None for any number.
         """
         side = self._side()
         until_us, data = side.waits.deadline_us(self.timeout), bytearray()
@@ -414,10 +414,10 @@ class SimSerial(_SimPort):
         return waiting
 
     def write(self, data: ReadableBuffer) -> int:
-        """Write bytes; time advances until the buffer of the line has accepted them.
+        """Write bytes. The virtual time advances until the buffer of the line has accepted them.
 
         Args:
-            data: the bytes.
+            data: bytes to send.
 
         Returns:
             The number of accepted bytes. All bytes are accepted, except with a `write_timeout` of 0
@@ -425,7 +425,7 @@ class SimSerial(_SimPort):
 
         Raises:
             SerialTimeoutException: the timeout has expired. Some bytes may have been accepted.
-            SerialException: the port is closed, or there was no room for an hour.
+            SerialException: the port is closed, or the buffer was full for an hour.
             TypeError: the data is text.
         """
         side = self._side()
@@ -475,10 +475,10 @@ class SimSerial(_SimPort):
     # Breaks
 
     def send_break(self, duration: float = 0.25) -> None:
-        """Hold the line at 0 for a duration, which advances the time.
+        """Send a break: hold the line at 0, and advance the virtual time meanwhile.
 
         Args:
-            duration: duration in seconds.
+            duration: duration of the break in seconds.
         """
         side = self._side()
         self.break_condition = True

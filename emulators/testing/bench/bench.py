@@ -66,7 +66,7 @@ SOON: Final = "100ms"
 
 
 class BenchDevice:
-    """A device of a bench: its inputs, outputs and faults, and the connections for its host.
+    """A device of a bench, as tests use it: its inputs, outputs, faults and host connections.
 
     `describe` lists the names of inputs, outputs, buttons and faults.
 
@@ -104,7 +104,7 @@ class BenchDevice:
         return described.tables(values)
 
     def set(self, name: str, *values: Setting | Sequence[Setting]) -> None:
-        """Set an input, or all inputs of a group.
+        """Set an input of the device, or all inputs of a group.
 
         Args:
             name: name of the input or group, such as `stick`.
@@ -119,7 +119,7 @@ class BenchDevice:
         self._mode.request("set", name=self._full(name), value=list(each))
 
     def get(self, name: str) -> Setting:
-        """Return the present value of an input or output.
+        """Return the present value of an input or output of the device.
 
         Args:
             name: name of the input or output, such as `state`.
@@ -134,22 +134,23 @@ class BenchDevice:
         return value
 
     def press(self, name: str, for_: Duration = PRESS) -> None:
-        """Press a button, and release it after a time on the bench.
+        """Press a button of the device, and release it after a duration.
 
         Args:
             name: name of the button.
-            for_: duration of the press, from the tick in which the device sees the button pressed.
+            for_: duration of the press in bench time, from the tick in which the device sees the
+                button pressed.
         """
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
     def fault(
         self, spec: str, *, when: tasks.Condition | None = None, for_: Duration | None = None
     ) -> None:
-        """Start a fault: now, at a time, or when a condition becomes true.
+        """Start a fault of the device or its wire: now, at a time, or when a condition is true.
 
         Args:
-            spec: the fault of the device or of its wire, such as `cut`, `cut@2s-3s`,
-                `cut@+1s-+2s` with times from now, or `flip=0.001`.
+            spec: name and arguments of the fault, such as `cut`, `cut@2s-3s`, `cut@+1s-+2s` with
+                times from now, or `flip=0.001`.
             when: condition that starts the fault, such as `on_line("OK:output", nth=3)`. With a
                 condition, `spec` must not have a time.
             for_: duration from the start of the fault. By default the fault stays.
@@ -168,7 +169,7 @@ class BenchDevice:
         self._mode.fault(self.name, wanted, when, for_us)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, or cancel a scheduled fault.
+        """End a fault, or cancel a scheduled fault.
 
         Args:
             name: name of the fault.
@@ -195,7 +196,7 @@ class BenchDevice:
         self._mode.switch_power(self.name, on=True)
 
     def perform(self, text: str, do: Callable[[], object]) -> None:
-        """Run an action of several steps, such as switching the device off.
+        """Run an action of several steps on an emulated device, or ask a human operator to do it.
 
         Args:
             text: description of the action for a human operator, such as `switch VR2 off, unless it
@@ -210,19 +211,21 @@ class BenchDevice:
         self._mode.perform(self.name, text, do)
 
     def observe(self, text: str, seen: tasks.Condition, within: Duration = SOON) -> bool:
-        """Return whether something is observed: by a function if emulated, or by a human operator.
+        """Return whether something is observed on the device.
+
+        For an emulator a function decides. For a real device a human operator answers yes or no.
 
         Args:
-            text: description of the observation, such as `the motors drive forward at 30 %`. A
-                human answers yes or no.
-            seen: function that returns the answer for an emulator. If a human answers, `seen` is
-                not called.
+            text: description of the observation, such as `the motors drive forward at 30 %`.
+            seen: function that returns whether the observation is true for an emulator.
             within: longest wait, to which the tolerance of the bench is added.
         """
         return self._mode.observe(self.name, text, seen, us_of(within))
 
     def on_line(self, pattern: str, nth: int = 1) -> tasks.LineTrigger:
-        """Return a condition that is true after a line, or a frame as in candump, has passed.
+        """Return a condition that becomes true when a line or CAN frame has passed on the wire.
+
+        Such a condition can start a fault or end a wait.
 
         Args:
             pattern: the whole line without its end, such as `OK:output`, or the whole frame, such
@@ -237,11 +240,14 @@ class BenchDevice:
 
     @property
     def link(self) -> Link[Any]:
-        """New link for a client; it carries bytes on a serial line, or frames on a CAN bus."""
+        """New connection for a host on the device's wire.
+
+        The link carries bytes on a serial line, or frames on a CAN bus.
+        """
         return self._mode.doors.link(self._wire())
 
     def serial(self, **options: Any) -> serial.Serial:
-        """Open the serial line as a pyserial object, typed as the result of `serial_for_url`.
+        """Open the device's serial line for a host, as a pyserial port.
 
         Args:
             options: options of `serial.Serial`. The `timeout` counts in the time of the bench.
@@ -250,9 +256,10 @@ class BenchDevice:
 
     @property
     def url(self) -> str:
-        """URL of the serial line, for a program that opens the line itself while the bench is open.
+        """URL of the device's serial line, for a host program that opens the line itself.
 
-        `serial.serial_for_url` opens the URL: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
+        `serial.serial_for_url` opens the URL while the bench is open: `tickrig://rrc`,
+        `/dev/pts/7`, `COM3`.
         """
         address = self._mode.doors.address(self._wire())
         if not isinstance(address, str):
@@ -365,7 +372,7 @@ class Bench(BenchDevice, Closing):
         terminal: Terminal | None = None,
         limit: Duration = LIMIT,
     ) -> Self:
-        """Return the bench of a rig file.
+        """Return the bench that the content of a rig file describes.
 
         Args:
             plan: content of the rig file.
@@ -431,7 +438,7 @@ class Bench(BenchDevice, Closing):
         self._mode.run_for(us_of(duration))
 
     def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
-        """Advance the time until a condition is true.
+        """Advance the time of the bench until a condition is true.
 
         Args:
             done: function that returns whether the condition is true. The function must have no
@@ -445,7 +452,7 @@ class Bench(BenchDevice, Closing):
         return self._mode.wait_until(done, us_of(within))
 
     async def sleep(self, duration: Duration) -> None:
-        """Wait in an async body; other tasks run during the wait.
+        """Wait for a duration of bench time, in an async test; other tasks run during the wait.
 
         Args:
             duration: duration in microseconds, or a text such as `"100ms"`.
@@ -453,7 +460,7 @@ class Bench(BenchDevice, Closing):
         await tasks.Wait(_never, self.now_us + us_of(duration))
 
     async def until(self, done: tasks.Condition, within: Duration | None = None) -> bool:
-        """Wait in an async body until a condition is true.
+        """Wait in an async test until a condition is true.
 
         Args:
             done: function that returns whether the condition is true, such as `on_line("OK:beep")`.
@@ -467,7 +474,7 @@ class Bench(BenchDevice, Closing):
         return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
     async def edge(self, name: str, within: Duration | None = None) -> Setting:
-        """Wait in an async body until an input or output changes.
+        """Wait in an async test until an input or output changes, and return its new value.
 
         Args:
             name: name of the input or output.
@@ -482,17 +489,18 @@ class Bench(BenchDevice, Closing):
         return self.get(name)
 
     def start(self, body: Coroutine[Any, Any, T]) -> tasks.Task[T]:
-        """Start an async body that runs beside the test while time advances.
+        """Start a coroutine that runs beside the test while the time of the bench advances.
 
         Args:
             body: the coroutine. It awaits `sleep`, `until`, `edge` or a task, and must not advance
                 the time itself.
 
         Returns:
-            The task. Use `await` or the method `result` of the task to get the result of the body.
+            The task. Use `await` or the method `result` of the task to get the result of the
+            coroutine.
 
         Raises:
-            NotOnThisBench: the devices are real; use `run` for a single body.
+            NotOnThisBench: the devices are real; use `run` for a single coroutine.
         """
         try:
             task = self._mode.act(lambda rig: tasks.Task(rig, body))
@@ -508,16 +516,18 @@ class Bench(BenchDevice, Closing):
             task.check()
 
     def run(self, body: Coroutine[Any, Any, T]) -> T:
-        """Run an async body to its end, and return its result.
+        """Run a coroutine on the bench to its end, and return its result.
+
+        The time of the bench advances while the coroutine waits.
 
         Args:
             body: the coroutine. It awaits `sleep`, `until`, `edge`, or tasks that it starts.
 
         Raises:
-            TypeError: the body awaits something else, such as `asyncio.sleep`.
-            RuntimeError: an awaited condition does not become true within a day of virtual
-                time, or can never become true.
-            AssertionError: the waits of the body together exceed the limit of the bench.
+            TypeError: the coroutine awaits something else, such as `asyncio.sleep`.
+            RuntimeError: an awaited condition does not become true within a day of virtual time, or
+                can never become true.
+            AssertionError: the waits of the coroutine together exceed the limit of the bench.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):
@@ -559,7 +569,7 @@ class Bench(BenchDevice, Closing):
         return nullcontext(time)
 
     def transcript(self) -> BenchTranscript:
-        """Return the latest lines, frames and actions, each with time, wire, direction and text.
+        """Return the latest lines, frames and actions on the bench, with time, wire and direction.
 
         The latest 10,000 lines are kept. If there were more, the first line of the text has the
         number of earlier lines.
@@ -597,10 +607,10 @@ class Bench(BenchDevice, Closing):
         )
 
     def save_trace(self, path: Path | str) -> None:
-        """Save traffic, inputs and faults of all devices, for `tickrig replay`.
+        """Save a recording of the run: traffic, inputs and faults of all devices.
 
-        With real devices the file has the traffic of their ports and the operator's actions, which
-        `tickrig compare` reads.
+        `tickrig replay` reads the file. With real devices the file has the traffic of their ports
+        and the operator's actions, and `tickrig compare` reads it.
 
         Args:
             path: path of the file; an existing file is replaced.
@@ -611,9 +621,9 @@ class Bench(BenchDevice, Closing):
         self._mode.save_trace(Path(path))
 
     def fork(self) -> Bench:
-        """Return a twin of the bench that continues independently in virtual time.
+        """Return a copy of the bench that continues independently in virtual time.
 
-        The twin has the devices, wires, faults and pending events, but no hosts and no triggers.
+        The copy has the devices, wires, faults and pending events, but no hosts and no triggers.
 
         Raises:
             NotOnThisBench: the bench is not in virtual time.
@@ -621,11 +631,11 @@ class Bench(BenchDevice, Closing):
         return Bench.of_mode(self._mode.fork())
 
     def snapshot(self, *hosts: object) -> MachineSnapshot:
-        """Return a snapshot that restores the present state of the bench any number of times.
+        """Return a snapshot that can restore the present state of the bench any number of times.
 
-        The snapshot restores the same bench: references to the bench and to its links stay valid. A
-        snapshot takes a small part of the time of a `fork`. Restoring removes tasks, triggers and
-        hosts that were added later.
+        The snapshot restores the same bench: references to the bench and to its links stay valid.
+        Making a snapshot takes a small part of the time of a `fork`. Restoring removes tasks,
+        triggers and hosts that were added later.
 
         Args:
             hosts: hosts and other objects of a test, which are restored together with the bench.
@@ -665,12 +675,12 @@ def open_bench(
     seed: int | None = None,
     limit: Duration = LIMIT,
 ) -> Bench:
-    """Open the bench described by a rig file.
+    """Open the bench that a rig file describes.
 
     Args:
         path: path of the rig file.
         mode: `virtual`, `real` or `hardware`.
-        seed: seed of all random numbers, which replaces the seed in the file.
+        seed: seed of all random numbers, or None to use the seed in the file.
         limit: longest time that hosts may wait, as in `Bench`.
 
     Raises:

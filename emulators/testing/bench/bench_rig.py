@@ -64,11 +64,11 @@ _ENDS: Final = (b"host", b"device")
 
 
 class Journal(WireLog):
-    """The latest lines, frames and actions of all wires, in order of time.
+    """Log of a bench: the latest lines, frames and actions on all wires, in order of time.
 
     A line of text is recorded when the device receives or sends its end. The bytes of a serial line
     are those that the host sent or received. If a fault has changed data, a further entry with the
-    mark `~` shows them as sent and as received.
+    mark `~` shows the data as sent and as received.
     """
 
     def __init__(self) -> None:
@@ -91,11 +91,12 @@ class Journal(WireLog):
         ends: tuple[bytes, bytes] = _ENDS,
         splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
-        """Return a function that records traffic as sent and as received, if a fault changed it.
+        """Return a function that records traffic that a fault has changed, as sent and as received.
 
         Args:
             source: name of the line or node.
-            ends: words for the far and the near end.
+            ends: words for the sender and the receiver of traffic to the device, such as host and
+                device.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """
@@ -167,10 +168,11 @@ class Journal(WireLog):
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return the kept lines in order of time, and open frames that only a silence will end.
+        """Return the kept lines in order of time.
 
-        The time of an action is the next tick of its device. Therefore an action may be added
-        before frames that end earlier.
+        Frames that only a silence will end are included, although they are not complete. An action
+        has the time of the next tick of its device, so it may have been added before frames that
+        end earlier.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
@@ -198,9 +200,9 @@ def _maps(frame: CanFrame) -> bool:
 
 
 def text_of(lines: Sequence[WireLine]) -> str:
-    """Write the kept lines as text, one line each.
+    """Return the lines of a journal as text.
 
-    The number of earlier lines, no longer kept, is in the first line.
+    If earlier lines are no longer kept, the first line has their number.
     """
     written = [line_text(line) for line in lines]
     if missing := missing_of(lines):
@@ -221,10 +223,10 @@ def missing_of(lines: Sequence[WireLine]) -> str:
 
 
 class BenchOperator(Operator):
-    """Sets inputs and starts faults of several devices.
+    """Operator of several devices: sets their inputs and starts their faults.
 
     Args:
-        assembly: the devices on the physical side.
+        assembly: the inputs and outputs of all devices.
         queue: queue for scheduled actions.
         faults: faults of the wires and nodes.
     """
@@ -245,14 +247,15 @@ class BenchOperator(Operator):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The devices of a bench on their wires, with initial values and signals.
+    """Everything from which a bench is made: devices on their wires, initial values and signals.
 
     Attributes:
-        mounts: the devices on their wires.
-        bodies: bodies moved by drives; each body is also a device `body`.
-        start: initial inputs by device and name.
-        signals: values that change with time, by `DEVICE/INPUT` or by the name that formulas use.
-        stores: store files of nodes, which are saved while time passes.
+        mounts: wires with their devices.
+        bodies: mechanical bodies that drives move; each body is also a device `body`.
+        start: initial values of inputs, by device and name.
+        signals: values that change with time. The key is `DEVICE/INPUT`, or the name that formulas
+            use.
+        stores: files with stored parameters of nodes, which are saved while time passes.
         seed: seed of all random numbers.
     """
 
@@ -281,17 +284,19 @@ class Parts:
 
 
 class RigState(Copyable):
-    """State of a bench in virtual and in real time; a twin gets a copy.
+    """The rig of a bench with its wires, devices, faults and recorder.
+
+    A copy of the bench gets a copy of this state.
 
     Args:
-        parts: the parts of the bench.
-        bridges: connections with the outside world.
+        parts: wires and devices of the bench.
+        bridges: connections to hosts outside the process.
         clock: clock of the rig, or None to use a `VirtualClock`.
-        trace: file of the recording, or None to record in memory if `keeps` is true.
+        trace: file of the recording, or None for no file.
         keeps: whether the run is recorded in memory if there is no file.
 
     Raises:
-        ValueError: an invalid input or signal.
+        ValueError: an input or signal is invalid.
         OSError: the file cannot be opened.
     """
 
@@ -344,12 +349,12 @@ class RigState(Copyable):
             chance.seed = seed * len(self.chances) + number
 
     def full_fault_name(self, owner: str, fault: str) -> str:
-        """Return the full name of a fault.
+        """Return the full name of a fault, which is unique on the bench.
 
         Args:
-            owner: the device with the fault, the device whose wire has the fault, or the wire
+            owner: name of the device that has the fault or whose wire has it, or of the wire
                 itself. An empty name stands for any of these.
-            fault: name of the fault at the owner.
+            fault: short name of the fault.
 
         Raises:
             ValueError: the fault is unknown.
@@ -366,13 +371,14 @@ class RigState(Copyable):
         return full
 
     def faults_of(self, owner: str) -> dict[str, str]:
-        """Return the faults of a device and its wire, of a wire only, or of the whole bench.
+        """Return the faults of a device and its wire, of a wire alone, or of the whole bench.
 
         Args:
-            owner: name of the device or wire, or empty for all.
+            owner: name of the device or wire, or empty for the whole bench.
 
         Returns:
-            Full names of the faults by the short names that the faults have at the owner.
+            Full names of the faults, which are unique on the bench, by the short names for this
+            owner.
         """
         everything = self.operator.faults
         if not owner:
@@ -385,7 +391,7 @@ class RigState(Copyable):
         return faults
 
     def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on; raise ValueError if there is none."""
+        """Return the name of the wire of a device; raise ValueError if no such device exists."""
         for mount in self.mounts.values():
             if device in mount.parts:
                 return mount.name
@@ -400,15 +406,13 @@ def _header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
 
 @dataclass(frozen=True, slots=True)
 class BenchDescription:
-    """Inputs, outputs and faults of a device, or of all devices of a bench.
-
-    Signals and faults have the names that the device or the bench uses.
+    """Inputs, outputs and faults of one device, or of all devices of a bench, by name.
 
     Attributes:
         name: name of the device or bench.
         inputs: all inputs, including buttons and physical faults.
-        groups: inputs that are set together.
-        outputs: names of the outputs. A signal that is also an input is only in `inputs`.
+        groups: names of the inputs that are set together, by name of their group.
+        outputs: all outputs. A signal that is also an input is only in `inputs`.
         faults: physical faults, and faults of the wire.
     """
 
@@ -434,10 +438,11 @@ class BenchDescription:
         return notebook.heading(self.name) + self.tables({})
 
     def tables(self, values: Mapping[str, object]) -> str:
-        """Return tables of inputs, outputs, faults and groups, as HTML for Jupyter.
+        """Return HTML tables of the inputs, outputs, faults and groups, for Jupyter.
 
         Args:
-            values: present values by name of the input or output.
+            values: present values by name of the input or output. If it is empty, no values are
+                shown.
         """
         named = self.named
         columns = ["name", *["value"] * bool(values), "unit", "what"]
@@ -498,17 +503,19 @@ _BUS_AND_NODE: Final = (b"bus", b"node")
 
 
 class BenchRig(RunningEmulator):
-    """A rig with all devices of a bench; `EmulatorControl` answers requests about it.
+    """The running emulation of a bench: its rig with all devices, their operator and the journal.
+
+    `EmulatorControl` answers requests about it.
 
     Args:
         name: name of the bench.
-        state: state of the bench.
-        link: address for hosts, as text.
+        state: rig, wires and devices of the bench.
+        link: address at which hosts find the bench, as text.
 
     Attributes:
-        state: state of the bench.
-        journal: journal of the traffic and the actions.
-        orders: scheduled faults, except those of a control socket.
+        state: rig, wires and devices of the bench.
+        journal: log of the traffic and the actions.
+        orders: scheduled faults, except those that a control socket has requested.
         ports: ports of hosts in real time, by name of the line.
     """
 
@@ -575,7 +582,7 @@ class BenchRig(RunningEmulator):
 
     @property
     def settling_us(self) -> int:
-        """Time until the bytes sent by hosts have arrived and each device has had two ticks."""
+        """Duration until the bytes sent by hosts have arrived and each device has had two ticks."""
         now_us = self.rig.now_us
         lines = [one.line for one in self.state.mounts.values() if isinstance(one, LineMount)]
         sent_us = [line.b.sent_us for line in lines if line.b.sent_us < NEVER]

@@ -20,7 +20,7 @@ class BenchError(Exception):
 
 
 class NotOnThisBench(BenchError):  # noqa: N818 - no error of the test
-    """The mode of this bench does not support the operation; the message has the reason."""
+    """Raised if the mode of the bench does not support an operation; the message has the reason."""
 
     __module__ = "tickrig"
 
@@ -32,7 +32,10 @@ class BenchBlocked(BenchError):  # noqa: N818 - no error of the device
 
 
 class MachineTooSlow(BenchBlocked):
-    """The machine was too slow for real time: delays may come from it, not from the device."""
+    """Raised if the machine was too slow to keep real time.
+
+    Delays in the test may then come from the machine, not from the device, so there is no verdict.
+    """
 
     __module__ = "tickrig"
 

@@ -117,7 +117,7 @@ def _name_of(plan: BusPlan) -> str:
 
 
 def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
-    """Return a link to a bus; the link does not receive the frames that it sends.
+    """Return a link of a host to a python-can bus, without the frames that the link itself sends.
 
     Raises:
         BusGone: the bus cannot be opened.
@@ -128,15 +128,15 @@ def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
 
 
 def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
-    """Connect an emulated bus with a python-can bus, and return the bridge.
+    """Connect an emulated CAN bus with a python-can bus, and return the bridge between them.
 
     Args:
         end: end of the emulated bus.
-        plan: the bus of python-can.
-        stack: stack that closes the bridge at the end.
+        plan: settings of the python-can bus.
+        stack: exit stack that closes the python-can bus at the end.
 
     Raises:
-        BusGone: the bus of python-can cannot be opened.
+        BusGone: the python-can bus cannot be opened.
     """
     bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)

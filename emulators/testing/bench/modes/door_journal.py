@@ -27,10 +27,11 @@ from tickrig.wire.can import CanFrame, Frames
 
 
 class PortRecord:
-    """Records traffic and actions for `tickrig compare`; several host threads may use it at once.
+    """Records the traffic of real devices and the operator's actions, for `tickrig compare`.
 
-    In the trace a serial line has the name of its first device, and a CAN bus has its own name. The
-    trace has no actions on nodes, because a bus is compared by its frames.
+    Several host threads may use it at once. In the trace a serial line has the name of its first
+    device, and a CAN bus has its own name. The trace has no actions on nodes, because a bus is
+    compared by its frames.
 
     Args:
         plan: content of the rig file.
@@ -91,12 +92,12 @@ def _wire_entry(mount: Mount) -> WireEntry:
 
 
 class DoorJournal(Journal):
-    """A journal of the traffic that hosts in several threads send and receive.
+    """Journal of a bench in real time, whose hosts send and receive in several threads.
 
     Args:
         now_us: function that returns the time in microseconds.
         after: function that is called after traffic was received.
-        record: trace that gets the same data.
+        record: recording that gets the same data.
     """
 
     def __init__(
@@ -108,11 +109,11 @@ class DoorJournal(Journal):
         self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
     def watch(self, mount: Mount, pace: HostPace) -> HostPace:
-        """Return a monitor that records the traffic of a connection to a wire.
+        """Return a monitor that adds the traffic of a host's connection to the journal.
 
         Args:
             mount: wire of an equivalent emulated bench.
-            pace: monitor that records how late the host is.
+            pace: monitor that measures how late the host is.
         """
         if isinstance(mount, LineMount):
             return _Watch(pace, partial(self._hear_bytes, mount.name, self._splitting(mount)))
@@ -121,7 +122,13 @@ class DoorJournal(Journal):
         return watch
 
     def note(self, device: str, text: str, **changes: Setting) -> None:
-        """Record an action on a device, and the inputs of the device after the action."""
+        """Add an action of the operator to the journal.
+
+        Args:
+            device: name of the device.
+            text: description of the action.
+            changes: inputs of the device that the action has changed, with their new values.
+        """
         with self._lock:
             for name, value in changes.items():
                 self.record.changed(device, name, value)
@@ -149,9 +156,10 @@ class DoorJournal(Journal):
         self._after()
 
     def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Seen) -> None:
-        """Record frames of a connection, unless another connection of the bus has recorded them.
+        """Add CAN frames of a host's connection to the journal.
 
-        The trace has no error frames.
+        A frame is left out if another connection of the same bus has already recorded it. The trace
+        has no error frames.
         """
         with self._lock:
             self.record.passed(wire, mark, [each for each in frames if isinstance(each, CanFrame)])

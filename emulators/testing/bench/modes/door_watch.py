@@ -30,12 +30,12 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Monitor of a host's connection: measures how late the host was.
+    """Measures how late a host's waits at its connection to a bench were.
 
-    Subclasses override `passed` to get the traffic.
+    Subclasses override `passed` to get the traffic of the connection.
 
     Attributes:
-        late_us: largest delay up to now.
+        late_us: largest delay up to now, in microseconds.
     """
 
     def __init__(self, now_us: Callable[[], int] = _now_us) -> None:
@@ -64,15 +64,15 @@ class HostPace:
 
 
 class LinkGone(PortGone, LinkClosed):
-    """The port of a link is gone; hosts can catch it as a closed line."""
+    """Raised by a link whose port is gone. It is a `LinkClosed`, so hosts can handle it as such."""
 
 
 class WatchedLink(Generic[W]):
-    """A `Link` that reports its traffic, and the duration of waits without result.
+    """Wrapper of a host's `Link` that reports its traffic to a monitor, and how long waits took.
 
     Args:
-        link: the link that is monitored.
-        watch: the monitor.
+        link: the wrapped link.
+        watch: monitor that gets the reports.
     """
 
     def __init__(self, link: Link[W], watch: HostPace) -> None:
@@ -96,7 +96,10 @@ class WatchedLink(Generic[W]):
         self._watch.passed(Mark.TO_DEVICE, traffic)
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return what arrived, or empty traffic after `timeout_us`.
+        """Return the traffic that has arrived, or empty traffic after the time-out.
+
+        Args:
+            timeout_us: longest wait in microseconds.
 
         Raises:
             LinkGone: the port is gone.
@@ -132,11 +135,11 @@ class WatchedLink(Generic[W]):
 
 
 class WatchedFrameLink(WatchedLink[Frames]):
-    """A `StampedLink` to a CAN bus that reports its traffic and its waits.
+    """Wrapper of a host's `StampedLink` to a CAN bus that reports traffic and waits to a monitor.
 
     Args:
-        link: the link that is monitored.
-        watch: the monitor.
+        link: the wrapped link.
+        watch: monitor that gets the reports.
     """
 
     def __init__(self, link: StampedLink, watch: HostPace) -> None:
@@ -144,7 +147,10 @@ class WatchedFrameLink(WatchedLink[Frames]):
         self._stamped = link
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a frame; return a time, and all frames that had arrived by that time.
+        """Wait for CAN frames; return a time, and all frames that had arrived by this time.
+
+        Args:
+            timeout_us: longest wait in microseconds.
 
         Raises:
             LinkGone: the bus is gone.
@@ -201,11 +207,11 @@ class WatchedPort(serial.SerialBase):
 
 
 def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> serial.SerialBase:
-    """Open a serial port that reports its traffic and its waits.
+    """Open a pyserial port that reports its traffic and its waits to a monitor.
 
     Args:
         url: URL of the port for `serial.serial_for_url`.
-        watch: monitor of the traffic.
+        watch: monitor that gets the reports.
         options: options of `serial.Serial`.
 
     Raises:
@@ -232,10 +238,10 @@ _LATE_US: Final = 5_000
 
 
 def too_slow(**late_us: int) -> str:
-    """Return which parts of a bench were too late for a verdict, or "" if no part was.
+    """Return a message if a part of the bench was too late for a valid test result, otherwise "".
 
     Args:
-        late_us: delay of each part, in microseconds.
+        late_us: largest delay of each part in microseconds, by name of the part.
 
     >>> too_slow(host=1_000, emulator=57_400)
     'the machine was too slow: host up to 1 ms, emulator up to 57 ms late'
@@ -257,18 +263,18 @@ _LONG_US: Final = 20 * _LOOK_US
 
 
 class CpuWaits:
-    """Measures how long threads wait for a processor; 0 if the system does not count waits.
+    """Measures how long the threads of this process had to wait for a processor.
 
     A thread waits for a processor when it could run, but other threads run instead. The waiting
     time is the second number in `schedstat` of each thread (Linux,
-    Documentation/scheduler/sched-stats).
+    Documentation/scheduler/sched-stats). On systems without this count the result is 0.
 
     Args:
         tasks: path of the folder with the threads.
         spares_looker: whether to omit the calling thread, which measures its own delay.
 
     Attributes:
-        worst_us: longest wait up to now, measured over about `_LOOK_US`.
+        worst_us: longest wait up to now in microseconds, measured over about `_LOOK_US`.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:
@@ -277,9 +283,12 @@ class CpuWaits:
         self._seen_us, self._own = -_LOOK_US, ""
 
     def look(self, now_us: int) -> None:
-        """Read the waits of all threads, unless the last check is recent.
+        """Update `worst_us` with the waits of all threads, unless the last update is recent.
 
-        If the last check is too old, the waits since then are ignored.
+        If the last update is too long ago, the waits since then are ignored.
+
+        Args:
+            now_us: present time in microseconds.
         """
         passed_us, before = now_us - self._seen_us, self._waited_ns
         if passed_us < _LOOK_US:

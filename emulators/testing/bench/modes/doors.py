@@ -46,7 +46,7 @@ _NOTIFIER_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class LinePlace:
-    """Address of a serial line.
+    """Address of a serial line, at which a host opens it.
 
     Attributes:
         url: device path, or URL of pyserial.
@@ -60,14 +60,14 @@ class LinePlace:
 
 
 class Doors:
-    """Opens the wires of a bench in real time for hosts: as links, serial objects and buses.
+    """Opens the wires of a bench in real time for hosts: as links, pyserial ports and CAN buses.
 
-    `close` also closes ports left open by hosts.
+    The method `close` also closes connections that hosts have left open.
 
     Args:
         places: addresses of the wires, by name.
-        watch_of: function that returns the monitor for a wire.
-        begin: function that starts the time; it is called when a connection is open.
+        watch_of: function that returns the monitor for the connections of a wire.
+        begin: function that starts the time of the bench; it is called when a connection is opened.
     """
 
     def __init__(
