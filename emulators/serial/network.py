@@ -564,7 +564,10 @@ class NetworkPort(NonCopyable):
             self._setting.look(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send data to the host and buffer the rest; without a host data are lost."""
+        """Send data to the host, and buffer what the host does not read.
+
+        Without a host the data are lost.
+        """
         if self._host is not None:
             if (setting := self._differing) is not None:
                 traffic = _sampled(traffic, self._uart, setting)

@@ -63,13 +63,13 @@ _MOST_ACTS: Final = 40
 
 
 class FuzzAct(NamedTuple):
-    """An action of a fuzzing run.
+    """One action of a fuzzing run on an emulated device.
 
     Attributes:
-        verb: kind of the action: `send`, `set` or `reset`.
+        verb: type of the action: `send`, `set` or `reset`.
         what: bytes or a frame for `send`, the name of an input and its value for `set`, or None for
             `reset`.
-        wait_us: pause after the action.
+        wait_us: pause after the action, in microseconds.
     """
 
     verb: str

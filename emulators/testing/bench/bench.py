@@ -541,7 +541,9 @@ class Bench(BenchDevice, Closing):
         return tasks.run_body(self._mode, body)
 
     def meanwhile(self, host: Callable[[int], object]) -> None:
-        """Keep a host running while a human answers, so that watchdogs do not expire.
+        """Keep a host running while a human answers a question of the bench.
+
+        So watchdogs that the host serves do not expire.
 
         Args:
             host: function of the host that is called repeatedly with a duration in microseconds,
@@ -580,7 +582,9 @@ class Bench(BenchDevice, Closing):
         return BenchTranscript(text_of(self._mode.journal()))
 
     def trace(self) -> BenchRecording:
-        """Return the recording that `save_trace` saves, as an object: `bench.trace().to_pandas()`.
+        """Return the recording of the run as an object, for example for `trace().to_pandas()`.
+
+        `save_trace` saves the same recording in a file.
 
         Raises:
             OSError: no temporary file can be written.

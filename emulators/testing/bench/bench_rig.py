@@ -216,7 +216,7 @@ def line_text(line: WireLine) -> str:
 
 
 def missing_of(lines: Sequence[WireLine]) -> str:
-    """Return a note with the number of earlier lines no longer kept, or "" if none is missing."""
+    """Return a note with the number of earlier lines that a journal no longer has, or ""."""
     before = lines[0].number - 1 if lines else 0
     came = f"{before} {'line' if before == 1 else 'lines'} came before"
     return f"{came}; the last {len(lines)} are kept" if before else ""
@@ -236,7 +236,7 @@ class BenchOperator(Operator):
         self._assembly, self._wires = assembly, faults.wires
 
     def full_name_of(self, name: str) -> str:
-        """Return the full name of a fault; the prefix of device or wire is optional."""
+        """Return the full name of a fault; the given name may have its device or wire in front."""
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
         return bare if owned and name not in self.faults and bare in self.faults else name
@@ -344,7 +344,7 @@ class RigState(Copyable):
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def draw_by(self, seed: int) -> None:
-        """Set new seeds, different for each wire, for the faults that start from now on."""
+        """Set new seeds for the random faults that start from now on, different for each wire."""
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 

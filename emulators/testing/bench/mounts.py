@@ -27,18 +27,18 @@ BIT_RATE: Final = 1_000_000
 
 
 class LineMount(Copyable):
-    """Devices on a serial line; only on RS485 several devices share a line.
+    """A serial line of a bench with its devices. Only an RS485 line may have several devices.
 
     Args:
         name: name of the line.
         settings: parameters of the line.
-        line: the line, if it is not made from `settings`. The ends of the line belong to the
+        line: the line, or None to make it from `settings`. The ends of the line belong to the
             devices, except `line.b`, which is the host's end.
 
     Attributes:
         line: the line.
         devices: devices by name.
-        entries: trace entries by name of the device.
+        entries: description of each device for the header of a trace, by name of the device.
         tap: traffic at the end of the first device, after faults of the line.
     """
 
@@ -54,16 +54,17 @@ class LineMount(Copyable):
     def add(
         self, name: str, device: Emulated[bytes], entry: DeviceEntry | None = None, seed: int = 0
     ) -> None:
-        """Put a device on the line.
+        """Put a device on the serial line, at the next free end.
 
         Args:
             name: name of the device.
             device: the device.
-            entry: trace entry of the device, if it can be rebuilt.
+            entry: description of the device for the header of a trace, if a replay can make the
+                device from it.
             seed: seed of random faults at the device's end.
 
         Raises:
-            ValueError: the line has no end for the device.
+            ValueError: the line has no free end for the device.
         """
         if not self._free:
             raise ValueError(f"{self.name} has no end for {name}: it is for {len(self.devices)}")
@@ -104,7 +105,7 @@ class LineMount(Copyable):
 
 
 class BusMount(Copyable):
-    """Nodes on a CAN bus.
+    """A CAN bus of a bench with its CANopen nodes.
 
     A further end of the bus acknowledges frames. A node is therefore never alone on the bus, even
     without a host.
@@ -118,7 +119,7 @@ class BusMount(Copyable):
         wire: the bus.
         nodes: nodes by name.
         node_faults: objects on which faults of a node are armed, by name of the node.
-        entries: trace entries by name of the node.
+        entries: description of each node for the header of a trace, by name of the node.
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
@@ -129,12 +130,13 @@ class BusMount(Copyable):
         self.open_end(frozenset())
 
     def add(self, name: str, slave: CanopenSlave, entry: DeviceEntry | None = None) -> None:
-        """Put a slave on the bus.
+        """Put a CANopen slave on the bus.
 
         Args:
             name: name of the node.
             slave: the slave.
-            entry: trace entry of the slave, if it can be rebuilt.
+            entry: description of the slave for the header of a trace, if a replay can make the
+                slave from it.
         """
         node = self.nodes[name] = late.Node(name, slave, self.wire)
         self.node_faults[name] = late.NodeFaults(node, self.wire)

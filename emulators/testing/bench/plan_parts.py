@@ -58,11 +58,11 @@ class _NoNodeIdError(ValueError):
 
 
 def parts_of(plan: RigPlan) -> Parts:
-    """Make the devices of a rig file and put them on their wires.
+    """Make the devices of a rig file, and put them on their wires.
 
     Raises:
-        ValueError: a device cannot be made, for example because its EDS is unreadable. A device
-            type does not know an option. A signal is invalid.
+        ValueError: a device cannot be made, for example because its EDS is unreadable; or a device
+            type does not know an option, or a signal is invalid.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, late.StoreFile] = {}
@@ -196,18 +196,18 @@ def rig_of(
     trace: Path | None = None,
     keeps: bool = True,
 ) -> BenchRig:
-    """Make the rig of a bench from its parts.
+    """Make the rig of a bench from its wires and devices.
 
     Args:
         parts: the devices on their wires.
-        plan: further settings: faults, and store files of nodes.
-        outside: connections for hosts. Without connections the time is virtual.
-        trace: the file of the recording.
+        plan: content of the rig file, for its faults.
+        outside: connections for hosts in real time, or None for virtual time.
+        trace: path of the recording, or None for no file.
         keeps: whether to record the run in memory if there is no file.
 
     Raises:
         ValueError: an input, signal or fault is invalid.
-        OSError: the file of the trace cannot be opened.
+        OSError: the file of the recording cannot be opened.
     """
     state = RigState(
         parts,
@@ -251,19 +251,19 @@ def mounts_of(
     line: LineSettings | None = None,
     sdo_timeout_us: int | None = None,
 ) -> list[Mount]:
-    """Put each serial device on a separate line, and all nodes on one CAN bus.
+    """Make the devices of a bench, each serial device on its own line, all nodes on one CAN bus.
 
     Args:
-        devices: devices by name.
+        devices: devices, device types or names of device types, by name of the device.
         seed: seed of all random numbers.
-        line: parameters of the serial lines. The default is the parameters of the device type, or
-            115 200 8N1.
+        line: parameters of the serial lines. By default the parameters of the device type, or 115
+            200 8N1.
         sdo_timeout_us: time-out of the SDO servers of all nodes, or None to keep the time-outs of
             the nodes.
 
     Raises:
-        ValueError: an object is neither a device nor a device type. The time-out is 0, or there is
-            a time-out but no node.
+        ValueError: an object is neither a device nor a device type; or the time-out is 0, or there
+            is a time-out but no node.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -300,13 +300,13 @@ def _set_timeout(slave: CanopenSlave, sdo_timeout_us: int | None) -> None:
 
 
 def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
-    """Return the device or type named by a text, like the `type` of a rig file.
+    """Return the device that a text names, as the key `type` of a rig file would.
 
     Args:
-        text: name or file of the device. A CANopen device may have its node-ID in front:
-            `5=drive.eds`.
+        text: name of a device type, or file of the device. A CANopen device may have its node-ID in
+            front: `5=drive.eds`.
         folder: folder of the files.
-        name: name of the device.
+        name: name of the device on the bench.
 
     Raises:
         ValueError: the text does not name a device.

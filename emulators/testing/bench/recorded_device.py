@@ -29,7 +29,9 @@ def node_entry(
     profile: str = AUTO,
     files: Iterable[Path] = (),
 ) -> DeviceEntry:
-    """Return the trace entry of a CANopen slave, before its first tick.
+    """Return the description of a CANopen slave for the header of a trace, before its first tick.
+
+    A replay makes the slave from this description.
 
     Args:
         wire: name of the bus.
@@ -64,14 +66,14 @@ def node_entry(
 def make_recorded(
     header: BenchHeader, name: str, folder: Path, cache: late.EdsCache, *, run_code: bool = False
 ) -> Any:
-    """Make the recorded device in its state at the start of the recording.
+    """Make a device for a replay, in the state that it had when the recording began.
 
     Args:
         header: header of the trace.
-        name: name of the device.
-        folder: folder of the trace, which is searched for the files that the trace names.
+        name: name of the device in the header.
+        folder: folder of the trace, in which the files are searched that the trace names.
         cache: cache of EDS files.
-        run_code: whether to run a Python file that the trace names.
+        run_code: whether a Python file that the trace names may be run.
 
     Raises:
         ValueError: the device cannot be made.
@@ -91,7 +93,10 @@ def make_recorded(
 
 
 def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
-    """Return the texts in trace entries that may name Python code of a user: `FILE.py:Class`."""
+    """Return the texts in a trace's header that may name Python code of a user, `FILE.py:Class`.
+
+    A replay checks them before it runs such code.
+    """
     return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 

@@ -32,16 +32,16 @@ _ORDINALS: Final = {1: "st", 2: "nd", 3: "rd"}
 
 
 class LineTrigger:
-    """Condition that is true after a line or frame has passed a number of times.
+    """Condition that becomes true when a line or CAN frame has passed a given number of times.
 
     Args:
         pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
-        nth: number of the occurrence, counted from the creation of the trigger. The first
+        nth: number of the occurrence, counted from the creation of the condition. The first
             occurrence has the number 1.
         source: name of the wire or device, or empty for any.
 
     Attributes:
-        count: number of occurrences.
+        count: number of occurrences up to now.
 
     Raises:
         ValueError: `nth` is less than 1.
@@ -80,7 +80,10 @@ def check_condition(condition: object) -> None:
 
 
 def text_of(condition: Condition) -> str:
-    """Return a description of a condition: its line, or file and line number of its function."""
+    """Return a description of a condition for messages.
+
+    It is the line that the condition waits for, or file and line number of its function.
+    """
     if isinstance(condition, LineTrigger):
         return str(condition)
     code = getattr(condition, "__code__", None)
@@ -100,7 +103,13 @@ def _ordinal(number: int) -> str:
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
-    """Call `act` once, between two ticks, as soon as a condition is true: now or after a step."""
+    """Call a function once, as soon as a condition is true: now, or after a later step of the rig.
+
+    Args:
+        rig: rig of the bench.
+        condition: function that returns whether the condition is true.
+        act: function to call. The call is between two ticks.
+    """
 
     def watch(now_us: int) -> None:
         if condition():
@@ -127,11 +136,11 @@ _WHAT_WAITS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """A wait in an async body.
+    """A wait in an async test: `await Wait(...)` returns whether the condition became true in time.
 
     Attributes:
         done: function that returns whether the condition is true.
-        until_us: time at which the body continues even if the condition is false.
+        until_us: time of the bench at which the test continues even if the condition is false.
     """
 
     done: Callable[[], bool]
@@ -159,12 +168,12 @@ class _TaskWait(Protocol):
 
 
 def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
-    """Run the body of a test, advancing the time while it waits.
+    """Run the coroutine of an async test, and advance the time of the bench while it waits.
 
     Raises:
-        TypeError: the body awaits something else, such as `asyncio.sleep`.
-        RuntimeError: an awaited condition does not become true within a day of virtual time,
-            or can never become true.
+        TypeError: the coroutine awaits something else, such as `asyncio.sleep`.
+        RuntimeError: an awaited condition does not become true within a day of virtual time, or can
+            never become true.
         HostHangsError: the limit for waits is reached.
         KeyboardInterrupt: the user has pressed Ctrl-C. The message has the condition and the
             waiting time.
@@ -199,11 +208,11 @@ _NO_TIME: Final = "await bench.sleep of some time"
 
 
 class Task(Generic[_T]):
-    """A body that runs beside the test, between two ticks.
+    """A coroutine that runs beside a test, always between two ticks of the rig.
 
     Args:
-        rig: the rig with its time.
-        body: the body, which must not advance the time itself.
+        rig: rig of the bench.
+        body: the coroutine, which must not advance the time itself.
     """
 
     def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, _T]) -> None:
@@ -222,10 +231,10 @@ class Task(Generic[_T]):
         return self._wait is None
 
     def result(self) -> _T:
-        """Return the result of the body, or raise its exception.
+        """Return the result of the task's coroutine, or raise the exception of the coroutine.
 
         Raises:
-            RuntimeError: the body has not ended yet, or the task was cancelled.
+            RuntimeError: the coroutine has not ended yet, or the task was cancelled.
         """
         __tracebackhide__ = True
         if self._error is not None:

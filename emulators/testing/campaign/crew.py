@@ -96,7 +96,11 @@ class _WorkerProcess:
             raise self._died() from None
 
     def verdict(self, run: Run, timeout_s: float) -> RunVerdict:
-        """Wait for the verdict of a run.
+        """Wait for the verdict of a run that was requested from this worker process.
+
+        Args:
+            run: the requested run.
+            timeout_s: longest wait in seconds.
 
         Raises:
             _RunHung: no verdict has arrived in time.
@@ -157,15 +161,15 @@ _ATTEMPTS: Final = 3
 
 
 class Crew:
-    """Worker processes that run tests; several threads can use a crew.
+    """The worker processes of a campaign on this machine; several threads can use them.
 
-    A crew starts a worker if no worker is idle.
+    A new process is started if none is idle.
 
     Args:
-        order: the tests to collect.
+        order: the tests that each worker collects.
 
     Attributes:
-        order: the tests to collect, as given.
+        order: the tests, as given.
     """
 
     def __init__(self, order: CampaignOrder) -> None:
@@ -181,15 +185,15 @@ class Crew:
         return self._idle[-1].collected
 
     def do(self, runs: Sequence[Run], digest: str) -> list[RunVerdict]:
-        """Execute runs one after the other, and return their verdicts.
+        """Execute test runs one after the other in a worker process, and return their verdicts.
 
         Args:
             runs: runs of collected tests.
-            digest: hash of the files of the tests. If the files here have another hash, the runs
-                are refused.
+            digest: hash of the files of the tests, as the campaign has it. The runs are refused if
+                the files on this machine have another hash.
 
         Raises:
-            Refusal: the files of the tests differ here.
+            Refusal: the files of the tests are different on this machine.
         """
         left, verdicts = deque(runs), list[RunVerdict]()
         deaths = Counter[int]()
@@ -267,10 +271,12 @@ class Crew:
 
 
 class LocalWorkers:
-    """Runs tests in processes of this machine, each with a thread that waits for it.
+    """Runs the tests of a campaign in several processes of this machine.
+
+    A thread waits for each process.
 
     Args:
-        crew: crew that has collected the tests.
+        crew: the processes, which have collected the tests.
         digest: hash of the files of the tests.
         count: number of processes.
     """

@@ -67,12 +67,12 @@ class _CrewPlugin(WorkerPlugin):
 
 
 class DaskWorkers:
-    """Runs tests on all threads of a Dask cluster.
+    """Runs the tests of a campaign on all threads of a Dask cluster.
 
-    The batch of a lost worker goes to another worker.
+    If a worker is lost, another worker repeats its runs.
 
     Args:
-        url: address of the scheduler.
+        url: address of the Dask scheduler.
         plan: plan of the campaign.
 
     Raises:

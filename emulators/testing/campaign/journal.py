@@ -20,14 +20,14 @@ class JournalFullError(OSError):
 
 
 class CampaignJournal:
-    """Verdicts in a file, one per run; a new process continues after the last verdict.
+    """File with the verdicts of a campaign, by which an interrupted campaign can continue.
 
-    A line has a checksum and a JSON array. Incomplete lines are ignored, and their runs are
-    repeated.
+    Each line has a checksum and a JSON array with one verdict. Incomplete lines are ignored, and
+    their runs are repeated.
 
     Args:
         path: path of the file.
-        head: properties of the campaign, by name.
+        head: properties of the campaign, by name. A file with other properties is refused.
 
     Attributes:
         verdicts: verdicts read from the file and added later, by number of the run.
@@ -87,7 +87,7 @@ class CampaignJournal:
         return True
 
     def add(self, verdicts: Iterable[RunVerdict]) -> list[RunVerdict]:
-        """Write new verdicts to the disk, and return them.
+        """Write verdicts to the journal file, and return those that were new.
 
         Raises:
             JournalFullError: some verdicts could not be written. These verdicts are not kept.

@@ -23,14 +23,14 @@ class CampaignRefusal(Exception):  # noqa: N818 - what a campaign cannot do; not
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignOrder:
-    """Tests that a worker collects, and the time-out of a run.
+    """Options by which each worker of a campaign collects and runs the tests.
 
     Attributes:
         tests: files, folders and node IDs, as in the command line of pytest.
-        parameters: parameters, as in `--bench-param`.
+        parameters: parameters of the tests, as in `--bench-param`.
         bench: path of the rig file, or empty to use the rig file of the tests.
-        keyword: expression, as in `-k`, or empty for all tests.
-        timeout_s: time-out of a run.
+        keyword: expression that selects tests, as in `-k`, or empty for all tests.
+        timeout_s: time-out of a run, in seconds.
         folder: absolute path of the folder in which the tests are searched.
         version: version of tickrig.
     """
@@ -54,11 +54,11 @@ class CampaignOrder:
 
 
 class CollectedTest(NamedTuple):
-    """A test that runs with many seeds.
+    """A test of a campaign, which is run with many seeds.
 
     Attributes:
         nodeid: node ID, as in pytest.
-        values: values of the parameters, as written in the command line.
+        values: values of the test's parameters, as written in the command line.
         place: node ID relative to the folder of the campaign.
     """
 
@@ -68,11 +68,11 @@ class CollectedTest(NamedTuple):
 
 
 class Collected(NamedTuple):
-    """Tests collected by a worker.
+    """The tests that a worker of a campaign has collected.
 
     Attributes:
-        tests: the tests with a bench.
-        left_out: node IDs of the tests without a bench.
+        tests: tests that use a bench.
+        left_out: node IDs of tests without a bench, which the campaign does not run.
         digest: hash of the files of the tests, and of the project's modules that these files
             import.
     """
@@ -83,7 +83,7 @@ class Collected(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A run of a test with a seed.
+    """One run of a campaign: a test with a seed.
 
     Attributes:
         number: number of the run in the campaign.
@@ -97,14 +97,14 @@ class Run(NamedTuple):
 
 
 class RunVerdict(NamedTuple):
-    """Outcome of a run of a test, with the reason.
+    """Outcome of one run of a campaign, with the reason.
 
     Attributes:
         number: number of the run in the campaign.
         outcome: `passed`, `failed`, `error`, `blocked`, `skipped`, `hung` or `died`. The outcome is
             `hung` if the run took too long, and `died` if its process ended three times.
-        virtual_us: age of the bench in virtual time.
-        where: file and line of the failure, or empty if the run passed or the place is unknown.
+        virtual_us: virtual time on the bench at the end of the run, in microseconds.
+        where: file and line of the failure, or empty if the run passed or the line is unknown.
         reason: reason of the outcome in one line, or empty if the run passed.
     """
 
@@ -121,7 +121,7 @@ _OUTCOMES: Final = frozenset({*(outcome.value for outcome in Outcome), HUNG, DIE
 
 
 def verdicts_of(answer: object, runs: Sequence[Run]) -> list[RunVerdict]:
-    """Return the verdicts that a worker has sent.
+    """Check the answer of a worker process, and return its verdicts.
 
     Args:
         answer: the data from the worker.

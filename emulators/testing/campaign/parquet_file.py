@@ -27,7 +27,7 @@ def parquet_of(names: Sequence[str], rows: Sequence[Sequence[str | int]]) -> byt
 
 
 def read_parquet(path: Path) -> Iterator[Sequence[str]]:
-    """Yield the names of the columns, then each row as texts.
+    """Read a Parquet file: yield the names of its columns, then each row as a sequence of texts.
 
     Raises:
         Refusal: the file is not a Parquet file.

@@ -19,7 +19,7 @@ _RANGE: Final = re.compile(r"([0-9]{1,19})(?:-([0-9]{1,19}))?")
 
 @dataclass(frozen=True, slots=True)
 class Seeds:
-    """Seeds in ascending order, each once.
+    """The seeds of a campaign, in ascending order without duplicates.
 
     Attributes:
         ranges: first and last seed of each range. The ranges do not touch or overlap.
@@ -33,7 +33,7 @@ class Seeds:
 
     @classmethod
     def parse(cls, text: str) -> Seeds:
-        """Return the seeds that a text lists.
+        """Return the seeds that a text lists, such as `7` or `3,17,100-199`.
 
         Raises:
             ValueError: the text is not a valid list of seeds.
@@ -87,7 +87,9 @@ _KEPT: Final = "kept"
 
 
 class Shard(NamedTuple):
-    """A part of a campaign, numbered from 1: `3/8` is the third of eight parts.
+    """A part of a campaign that runs separately, such as on another machine.
+
+    `3/8` is the third of eight parts.
 
     >>> str(Shard.parse("3/8"))
     '3/8'
@@ -114,13 +116,13 @@ _WHOLE: Final = Shard()
 
 @dataclass(frozen=True, slots=True)
 class CampaignPlan:
-    """The runs of a campaign: each test with each seed, seed by seed.
+    """The runs of a campaign: all tests with the first seed, then all with the second, and so on.
 
     Attributes:
-        order: options of the runs.
+        order: options by which workers collect and run the tests.
         collected: collected tests.
         seeds: seeds of the runs.
-        shard: part of all runs that this campaign does.
+        shard: part of the runs that this campaign executes.
     """
 
     order: CampaignOrder
@@ -140,9 +142,9 @@ class CampaignPlan:
         return tuple(text.partition("=")[0].strip() for text in self.order.parameters)
 
     def numbers(self) -> Iterator[int]:
-        """Yield the numbers of the runs of this shard, in ascending order.
+        """Yield the numbers of the runs that this part of the campaign does, in ascending order.
 
-        Every shard has runs of every test.
+        Every part has runs of every test.
         """
         tests, (part, parts) = len(self.collected.tests), self.shard
         for index in range(len(self.seeds)):
@@ -159,7 +161,13 @@ class CampaignPlan:
         return Run(number, self.collected.tests[test].nodeid, self.seeds[index])
 
     def values(self, number: int) -> tuple[str, ...]:
-        """Return the values of all parameters for a run, "" for a parameter its test lacks."""
+        """Return the values of all parameters for a run of the campaign, in order of the columns.
+
+        A value is empty if the test of the run does not have the parameter.
+
+        Args:
+            number: number of the run.
+        """
         test = self.collected.tests[number % len(self.collected.tests)]
         return tuple(test.values.get(name, "") for name in self.parameters)
 

@@ -29,18 +29,18 @@ WELL: Final = ("passed", "skipped")
 
 
 class CampaignRow(NamedTuple):
-    """A row of the table, for one run.
+    """A row of a campaign's table, with the result of one run.
 
     Attributes:
         test: node ID of the test.
         seed: seed of all random numbers.
         values: values of the parameters, as written in the command line. A value is empty if the
-            test lacks the parameter.
+            test does not have the parameter.
         outcome: outcome of the run, such as `passed`.
-        virtual_us: age of the bench in virtual time.
+        virtual_us: virtual time on the bench at the end of the run, in microseconds.
         where: file and line of the failure, or empty if the run passed.
         reason: reason of the outcome in one line, or empty if the run passed.
-        replay: command that replays the run with a trace, or empty if the run passed.
+        replay: command line that repeats the run with a trace, or empty if the run passed.
     """
 
     test: str
@@ -58,10 +58,10 @@ class CampaignRow(NamedTuple):
 
 
 class CampaignTable(NamedTuple):
-    """All runs, sorted by test and seed.
+    """Results of all runs of a campaign as a table, sorted by test and seed.
 
     Attributes:
-        parameters: names of the parameters, which are the names of columns.
+        parameters: names of the parameters, each of which is a column.
         rows: rows of the table, one row for each run.
     """
 
@@ -105,7 +105,9 @@ def _by_value(values: str) -> list[tuple[float, str]]:
 
 
 def write_table(table: CampaignTable, path: Path) -> None:
-    """Write a table atomically, as Parquet or CSV according to the suffix of the path.
+    """Write the table of a campaign to a file: Parquet or CSV, according to the suffix of the path.
+
+    A reader of the file sees the old or the new table, never a part.
 
     Raises:
         OSError: the file cannot be written.
@@ -122,7 +124,7 @@ def write_table(table: CampaignTable, path: Path) -> None:
 
 
 def read_table(path: Path) -> CampaignTable:
-    """Read a table that `write_table` has written.
+    """Read the table of a campaign that `write_table` has written.
 
     Raises:
         Refusal: the file is not a table of a campaign.
@@ -159,7 +161,7 @@ def _rows(
 
 
 def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
-    """Join the tables of shards; a run in several tables counts once.
+    """Merge the tables of the parts of a campaign; a run that is in several tables counts once.
 
     Raises:
         Refusal: the columns of the tables differ, or a run ended differently in two tables.
@@ -193,7 +195,7 @@ _LISTED: Final = 200
 
 
 def summary(table: CampaignTable, file: str) -> Iterator[str]:
-    """Yield the lines of the summary: counts by outcome, and details of the failures.
+    """Yield the lines of a campaign's summary: number of runs by outcome, then each failure.
 
     Args:
         table: table of the runs.
@@ -230,9 +232,9 @@ def _seeds(rows: Sequence[CampaignRow]) -> str:
 
 
 def missing_seeds(table: CampaignTable) -> Iterator[str]:
-    """Yield a message for each test that lacks seeds between its first and its last seed.
+    """Yield a message for each test of a campaign whose seeds have gaps.
 
-    Seeds are missing if the table of a shard is lost.
+    There are gaps if the table of a part of the campaign was not merged.
     """
     tests: dict[str, list[int]] = {}
     for row in table.rows:

@@ -67,9 +67,10 @@ class _Worker:
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Replace pytest's reporter by one without output.
+        """Replace pytest's terminal reporter by one without output, in a worker process.
 
-        pytest up to 9.0 needs a reporter to explain what `assert` compared.
+        There must be a reporter, because pytest up to 9.0 needs it to explain what `assert`
+        compared.
         """
         config.pluginmanager.unregister(name=_REPORTER)
         self._silent = pytest.TerminalReporter(config, open(os.devnull, "w"))  # noqa: SIM115

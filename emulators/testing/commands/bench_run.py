@@ -70,7 +70,7 @@ class _BenchOptions(RunOptions):
 def run_bench(
     file: Path, *, virtual: bool, control: Path | None, seed: int | None, **others: Any
 ) -> int:
-    """Run the bench of a rig file, and return the exit status.
+    """Run the bench of a rig file for the command line, and return the exit status.
 
     Args:
         file: path of the rig file.

@@ -103,12 +103,12 @@ class _Workers(Protocol):
 
 
 class Campaign:
-    """Runs to be done, and their verdicts.
+    """A campaign in progress: gives the remaining runs to workers, and stores their verdicts.
 
     Args:
         plan: all runs.
-        journal: journal that stores the verdicts. The runs in the journal are not repeated.
-        workers: the workers.
+        journal: file that stores the verdicts. The runs in the file are not repeated.
+        workers: processes or cluster that execute the runs.
     """
 
     def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: _Workers) -> None:
@@ -120,7 +120,7 @@ class Campaign:
         self._size = 1
 
     def verdicts(self) -> Iterator[list[RunVerdict]]:
-        """Do all runs; yield verdicts when they are on the disk.
+        """Execute all remaining runs; yield their verdicts as soon as they are stored on disk.
 
         Raises:
             CampaignRefusal: the workers cannot continue.
@@ -195,7 +195,7 @@ class _CampaignOptions:
 
     @property
     def output_paths(self) -> tuple[Path, ...]:
-        """Paths of the tables; the default name for a shard contains the numbers of the shard."""
+        """Paths of the campaign's tables; the default name has the number of the part, if any."""
         shard = Shard.parse(self.shard)
         part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
         return self.outputs or (Path(f"campaign{part}{_CSV}"),)
@@ -259,10 +259,11 @@ class _CampaignRun:
             )
 
     def run(self) -> CampaignTable:
-        """Do the remaining runs, and write the tables.
+        """Execute the remaining runs of the campaign, write the tables, and return the table.
 
         Raises:
-            CampaignRefusal: the campaign cannot run or continue. Finished runs are kept.
+            CampaignRefusal: the campaign cannot run or continue. The results of finished runs are
+                kept.
         """
         crew = Crew(self._options.order)
         try:

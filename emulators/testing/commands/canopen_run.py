@@ -67,7 +67,11 @@ class _BusYml(NamedTuple):
 
 
 def open_bus(options: BusOptions, stack: ExitStack) -> tuple[CountingPort, str, str]:
-    """Open the bus from options, environment or configuration files of python-can.
+    """Open the CAN bus that the options, the environment or python-can's configuration files name.
+
+    Args:
+        options: options of the command line for the bus.
+        stack: exit stack that closes the bus at the end.
 
     Returns:
         The bus, its name for messages, and its name in logs.
@@ -119,7 +123,7 @@ class _CanopenOptions(RunOptions):
 
     @property
     def in_real_time(self) -> bool:
-        """Whether the run is in real time; a scenario without a bus runs in virtual time."""
+        """Whether the nodes run in real time. A scenario without a bus runs in virtual time."""
         return not self.scenario or bool(self.bus or self.control)
 
 
@@ -135,7 +139,7 @@ class _FrameTranscript(Transcript):
         super().__init__(emulator, write, lambda line: False)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send a frame of a host; the log shows the frame when the bus has carried it."""
+        """Send a frame of a host; the log shows it when the emulated bus has transmitted it."""
         self._emulator.send(now_us, data)
 
 
@@ -319,7 +323,7 @@ _MORE_THAN_NODES: Final = "there is more than nodes on one bus ({what}): tickrig
 
 
 def read_rig(path: Path) -> _RigNodes:
-    """Read the nodes of a rig file, and the body that they move.
+    """Read the CANopen nodes of a rig file, and the mechanical body that their drives move.
 
     Raises:
         Refused: the file cannot be read, has errors, or has more than nodes on one bus.

@@ -28,7 +28,11 @@ _LOOKED_AT: Final = 65_536
 
 
 def check_files(files: tuple[Path, ...], strict: bool) -> int:
-    """Check files, and return the exit status: 1 for errors, 2 for an unreadable file."""
+    """Check rig files and bus.yml files, and print the result.
+
+    Returns:
+        The exit status: 0 without errors, 1 for errors, 2 for an unreadable file.
+    """
     return max([_check(file, strict) for file in files])
 
 

@@ -269,7 +269,12 @@ class _Bus:
         self._said: list[Said] = []
 
     def play(self, records: Iterable[BenchRecord], end_us: int) -> list[Said]:
-        """Replay a recording up to a time, and return the frames that the nodes have sent."""
+        """Send to emulated nodes what a recorded host sent, and return the frames of the nodes.
+
+        Args:
+            records: lines of the recording.
+            end_us: time at which the replay ends, in microseconds.
+        """
         for number, record in enumerate(records):
             at_us = max(0, self._begin_us + record.at_us)
             early = self._begin_us + record.at_us < 0
@@ -336,13 +341,13 @@ _HEAD: Final = ("", "recorded", "emulated", "different", "worst")
 def report(
     file: str, pairs: Mapping[str, Sequence[Pair]], tolerance_us: int, *, everything: bool
 ) -> tuple[list[str], bool]:
-    """Return the lines of a comparison, and whether the runs are equal.
+    """Return the lines that `tickrig compare` prints, and whether the two runs are equal.
 
     Args:
         file: name of the trace.
-        pairs: output pairs by device.
+        pairs: recorded lines with the corresponding lines of the emulator, by name of the device.
         tolerance_us: tolerance of the times in microseconds.
-        everything: whether equal lines are listed too.
+        everything: whether equal lines are listed, too.
     """
     rows = sorted(
         ((name, pair) for name, said in pairs.items() for pair in said),

@@ -75,10 +75,12 @@ class _PortTap:
         self._line = b""
 
     def run(self, terminal: int | None) -> None:
-        """Forward bytes between host and device until `stop` is called or the port is gone.
+        """Forward bytes between host and device, and record them, until the recording ends.
+
+        It ends when `stop` is called or the port of the device is gone.
 
         Args:
-            terminal: descriptor of the operator's terminal, or None without a terminal.
+            terminal: file descriptor of the operator's terminal, or None without a terminal.
         """
         reader = threading.Thread(target=self._read_port, daemon=True)
         reader.start()

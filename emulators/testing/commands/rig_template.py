@@ -43,7 +43,7 @@ class _TypeRefusedError(ValueError):
 
 
 def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
-    """Return the text of a new rig file.
+    """Return the text of a new rig file with devices and all their options.
 
     Args:
         types: types of the devices, as in a rig file.
@@ -185,7 +185,12 @@ _STANDARD_OUTPUT: Final = "-"
 
 
 def init(types: tuple[str, ...], file: Path) -> None:
-    """Write the template of a rig file to a file, or to standard output if the file is `-`."""
+    """Write a new rig file, or print it if `file` is `-`.
+
+    Args:
+        types: types of the devices, as in a rig file.
+        file: path of the new file. An existing file is not replaced.
+    """
     on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:

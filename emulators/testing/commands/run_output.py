@@ -76,7 +76,7 @@ class _Signals:
         return self._assembly.read(name) if driver is None else driver.value(name)
 
     def find(self, word: str) -> str:
-        """Return the full name of the signal that a word names.
+        """Return the full name of a signal from the word that the user wrote.
 
         Args:
             word: text such as `left/shaft_deg` or `left.shaft_deg`, or `shaft_deg` if only one
@@ -178,12 +178,12 @@ class _PathSampler:
 
 
 class RunPlots:
-    """Curves of a run, for the options `--plot SIGNALS` and `-o FILE`.
+    """Curves of signals during a run, for the options `--plot SIGNALS` and `-o FILE`.
 
     Args:
         words: the diagrams, one word for each diagram.
-        files: files for the curves, or empty for the terminal.
-        inputs: files that the run reads.
+        files: files for the curves, or empty to draw in the terminal.
+        inputs: files that the run reads, which must not be overwritten.
 
     Raises:
         Refused: a file cannot be written after the run.
@@ -238,7 +238,11 @@ class RunPlots:
         ]
 
     def finish(self, now_us: int, title: str) -> None:
-        """Write the files, or draw the curves in the terminal if there are no files.
+        """Write the curves of the finished run to the files, or draw them in the terminal.
+
+        Args:
+            now_us: time of the end of the run, in microseconds.
+            title: title of the diagrams.
 
         Raises:
             Refused: a file cannot be written.
@@ -374,13 +378,13 @@ def _draw_curves(first: Axes, taken: Sequence[bench_report.SignalSeries]) -> Non
 
 @dataclass(slots=True)
 class RunPage:
-    """The page of a run, for the option `--report FILE`.
+    """HTML page about a run, for the option `--report FILE`.
 
     Args:
         path: path of the page.
         plan: content of the rig file.
         words: words of the command line that repeats the run.
-        inputs: files that the run reads.
+        inputs: files that the run reads, which must not be overwritten.
 
     Raises:
         Refused: the page cannot be written after the run.
@@ -410,12 +414,12 @@ class RunPage:
     def finish(
         self, *, virtual: bool, rows: Iterable[Sequence[str]], paths: Sequence[page.PagePath]
     ) -> None:
-        """Write the page of the run.
+        """Write the HTML page of the finished run.
 
         Args:
             virtual: whether the run was in virtual time.
             rows: rows of the table of wires, each with name, place, rate and devices.
-            paths: the paths to draw.
+            paths: diagrams in which one signal is drawn over another.
 
         Raises:
             Refused: the page cannot be written.

@@ -39,10 +39,10 @@ _INPUTS: Final = {0x6000: "di", _ANALOGUE: "ai"}
 
 
 class SlaveStimulus:
-    """Sets inputs of a slave, and reads its outputs, for the conformance tester.
+    """Operates an emulated slave for the conformance tester: sets its inputs, reads its outputs.
 
     Args:
-        slave: the slave, whose supply is switched elsewhere.
+        slave: the slave. Its supply is switched elsewhere.
     """
 
     def __init__(self, slave: CanopenSlave) -> None:
@@ -163,7 +163,7 @@ _Buses = dict[str, dict[str, CanopenSlave]]
 def bench_source(
     mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
 ) -> ConformSource:
-    """Return the nodes of a bench as a source for the conformance tester.
+    """Return the CANopen nodes of a bench in the form in which the conformance tester tests them.
 
     The nodes boot first, which takes time on the bench.
 
@@ -175,7 +175,7 @@ def bench_source(
 
     Raises:
         ValueError: the bench is not in virtual time, or has no CANopen node with the node-ID, or
-            has several such nodes on different buses. The device is not a CANopen node.
+            has several such nodes on different buses; or the device is not a CANopen node.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
@@ -272,7 +272,7 @@ def _mount(rig: BenchRig, bus: str) -> BusMount:
 
 
 def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
-    """Open a rig file in virtual time, ignoring its settings for real time.
+    """Open a rig file in virtual time for the conformance tester, without its real-time settings.
 
     Args:
         path: path of the rig file.

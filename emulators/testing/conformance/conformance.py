@@ -52,10 +52,10 @@ from tickrig.wire.instant import NEVER
 
 
 class PoweredSlave:
-    """A slave that can be switched off and on.
+    """A CANopen slave under test with a switchable supply, whose exceptions are reported.
 
-    Exceptions of the slave are reported. Then its program restarts, as after a watchdog. If the
-    restart fails, the slave is dead until the power is switched.
+    After an exception the program of the slave restarts, as after a watchdog. If the restart fails,
+    the slave is dead until the supply is switched.
 
     Args:
         slave: the slave under test, switched on.
@@ -123,7 +123,7 @@ _BOOT_US = 100_000
 
 
 class SlaveBench:
-    """A slave and the tester on a bus.
+    """A CAN bus in virtual time with a slave under test and the conformance tester.
 
     Args:
         slave: the slave under test.
@@ -132,7 +132,7 @@ class SlaveBench:
             `power`, because the bench switches the supply itself.
 
     Attributes:
-        source: source for the tester.
+        source: the slave in the form in which the conformance tester tests it.
     """
 
     def __init__(self, slave: Slave, bit_rate: int, stimulus: Stimulus | None = None) -> None:
@@ -270,7 +270,10 @@ def level_of(word: str) -> Level:
 
 
 def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Split groups and ids of checks; raise ValueError if one of them matches no check."""
+    """Split a selection of conformance checks into the names of groups and single checks.
+
+    Raises ValueError if a name matches no check.
+    """
     names = patterns(only)
     for text in unknown(names):
         raise ValueError(f"only {text}")
@@ -301,7 +304,7 @@ _JSON: Final = ".json"
 
 
 def conformance_text(report: Report, *, baseline: Path | str | None = None) -> str:
-    """Return a report as text, as `canmon conform` prints it.
+    """Return a conformance report as text, as `canmon conform` prints it.
 
     Args:
         report: report that `conformance` has returned.
@@ -317,13 +320,15 @@ def conformance_text(report: Report, *, baseline: Path | str | None = None) -> s
 def write_conformance(
     report: Report, path: Path | str, *, baseline: Path | str | None = None
 ) -> None:
-    """Write a report to a file atomically.
+    """Write a conformance report to a file, whose suffix selects the format.
+
+    An existing file is replaced only after the new file is complete.
 
     Args:
         report: report that `conformance` has returned.
-        path: path of the file. The suffix selects the format: `.html` is a page with all frames,
-            `.xml` is JUnit, `.svg` is a badge, `.md` has the failures as texts for issues, `.json`
-            is JSON, and `.txt` has the failures as a baseline.
+        path: path of the file: `.html` is a page with all frames, `.xml` is JUnit, `.svg` is a
+            badge, `.md` has the failures as texts for issues, `.json` is JSON, and `.txt` has the
+            failures as a baseline.
         baseline: path of a file with known failures.
 
     Raises:
@@ -343,7 +348,10 @@ def write_conformance(
 
 
 def known_failures(path: Path | str | None) -> Baseline:
-    """Read a baseline, which is empty without a file; warn about ids that are not checks.
+    """Read a baseline file with known failures of a device, and warn about unknown checks in it.
+
+    Args:
+        path: path of the file, or None for no known failures.
 
     Raises:
         OSError: the file cannot be read.

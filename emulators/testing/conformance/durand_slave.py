@@ -24,10 +24,10 @@ _Entry = tuple[int, int, _Call]
 
 
 class DurandSlave:
-    """A `durand.Node` as a slave; this object replaces the node's network and scheduler.
+    """A `durand.Node` as a slave for the conformance tester, with virtual network and time.
 
-    durand has one scheduler for the whole process. The scheduler is replaced while the node is
-    called, and then restored.
+    durand has one scheduler for the whole process. It is replaced by the scheduler of this object
+    while the node is called, and then restored.
 
     Args:
         make: function that makes the node on a network. It is called again at each power-on.
@@ -84,7 +84,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
         self._subscriptions[cob_id] = callback
 
     def remove_subscription(self, cob_id: int) -> None:
-        """Unsubscribe from a COB-ID; raise KeyError if not subscribed, as a bus of durand does."""
+        """Cancel the subscription to a COB-ID. As in durand, raise KeyError if there is none."""
         self._subscriptions.pop(cob_id)
 
     def send(self, cob_id: int, msg: bytes) -> None:

@@ -18,7 +18,7 @@ _Data = bytes | bytearray | Iterable[int] | None
 
 
 class LocalNodeSlave:
-    """A `canopen.LocalNode` as a slave; this object replaces the library's network and timers.
+    """A `canopen.LocalNode` as a slave for the conformance tester, with virtual network and timers.
 
     The node boots as in the library's documentation (`nmt.send_command(0)`, then Pre-operational).
     Other work of an application is not done, such as restoring values at a reset or sending TPDOs.

@@ -19,10 +19,10 @@ TICK_US: Final = 1_000
 
 
 class Slave(Protocol):
-    """A CANopen slave as a state machine: time and frames in, frames out.
+    """Protocol of a CANopen slave under test: `tick` gets the time and frames, and returns frames.
 
-    The slaves of `tickrig.device` have this interface. Your slave has the interface, too, if it
-    takes the time as an argument and reports when it must be called next. It may wrap a C library.
+    The slaves of `tickrig.device` have this interface. Your own slave has it, too, if it gets the
+    time as an argument and reports when it must be called next. It may wrap a C library.
     """
 
     @property
@@ -32,22 +32,21 @@ class Slave(Protocol):
 
     @property
     def due_us(self) -> int:
-        """Time of the next action without a received frame, in microseconds.
+        """Time in microseconds at which the slave must be called even if no frame arrives.
 
-        A time in the past means that the slave is due in the next tick.
-        `tickrig.wire.instant.NEVER` means that the slave does not act without a frame. The slave is
-        not called before this time, unless a frame arrives.
+        The slave is not called earlier, unless a frame arrives. A time in the past means the next
+        tick. `tickrig.wire.instant.NEVER` means that the slave acts only on received frames.
         """
         ...
 
     def reset(self) -> None:
-        """Switch the power off and on.
+        """Switch the supply of the slave off and on.
 
         The slave boots in the next tick, and keeps stored parameters.
         """
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Run one tick.
+        """Run one tick of the slave: process the received frames, and return frames to send.
 
         Args:
             now_us: time since the start in microseconds, a multiple of `tick_us`.
@@ -83,7 +82,7 @@ class _NoFrames(Exception):  # noqa: N818 - what the slave has returned
 
 
 class CalledSlave:
-    """A slave made from a function that is called each millisecond.
+    """A slave for the conformance tester, made from a function that is called each millisecond.
 
     Args:
         make: function that makes the callable, in its state after power-on. It is called again at
@@ -119,12 +118,15 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Return whether a node is the function to call each millisecond, not one that makes it."""
+    """Return whether an object is itself the function to call each millisecond.
+
+    The user should pass a function that makes it instead.
+    """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 
 
 def checked_frames(sent: object) -> Frames:
-    """Return the frames of a slave if they can be sent on a bus.
+    """Return the frames that a slave's function has returned, if they can be sent on a CAN bus.
 
     Raises:
         _NoFrames: the value is not a tuple of frames that can be sent.
@@ -195,10 +197,10 @@ _OURS: Final = "tickrig."
 
 
 class Crashes:
-    """Exceptions of a program, kept until a callback is set.
+    """Collects the exceptions of a tested program until a callback is set, which then gets them.
 
     Args:
-        who: owner of the program, for messages.
+        who: owner of the program, for messages, such as `your slave`.
     """
 
     def __init__(self, who: str) -> None:

@@ -57,8 +57,8 @@ class _BenchLoop(asyncio.SelectorEventLoop):
         """Run a function in a thread, and wait for it without advancing the virtual time.
 
         Args:
-            executor: executor, as in asyncio.
-            func: the function.
+            executor: executor as in asyncio, or None for the default.
+            func: function to run.
             args: arguments of the function.
         """
         if executor is None:
@@ -88,10 +88,13 @@ class _BenchLoop(asyncio.SelectorEventLoop):
 
 @contextmanager
 def bench_loops(passing: Passing) -> Iterator[None]:
-    """Make asyncio create event loops in the time of a rig, for example in `asyncio.run`.
+    """Make asyncio create event loops that use the virtual time of a rig, during a `with` block.
+
+    So a host may call `asyncio.run`.
 
     Args:
-        passing: the object whose time advances, in this thread only.
+        passing: object that advances the time when a loop waits. Only loops of the calling thread
+            use it.
     """
     owner, original = get_ident(), asyncio.events.new_event_loop
 

@@ -35,7 +35,10 @@ class UnpatchedTimeError(HostTimeError):
 
 
 class HostHangsError(AssertionError):
-    """A host does not return: it waits longer than its bench or its machine allows."""
+    """Raised if a host does not return, because it waits longer than its bench allows.
+
+    In a search, the limit is set by the machine that the search runs.
+    """
 
     __module__ = "tickrig"
 
@@ -66,7 +69,7 @@ def _python_folders() -> tuple[str, ...]:
 
 @cache
 def is_host(module: str, file: str) -> bool:
-    """Return whether code is host code.
+    """Return whether code belongs to a host, and so uses the time of the bench.
 
     Args:
         module: name of the module of the code.
@@ -94,7 +97,10 @@ def place_of(file: str, line: int) -> str:
 
 
 def host_places(frame: FrameType | None) -> list[str]:
-    """Return the lines of host code that have led to a frame, from the innermost to the test."""
+    """Return the lines of host code in the call stack of a frame, from innermost to outermost.
+
+    The outermost is in the test.
+    """
     places: list[str] = []
     while frame is not None:
         module, file = frame.f_globals.get("__name__") or "", frame.f_code.co_filename
@@ -107,7 +113,7 @@ def host_places(frame: FrameType | None) -> list[str]:
 
 
 def place_of_body(body: object) -> str:
-    """Return file and line of the innermost host code in a coroutine that waits; empty if none."""
+    """Return file and line of host code at which a coroutine waits, or "" if there is none."""
     place = ""
     while (frame := getattr(body, "cr_frame", None)) is not None:
         file = frame.f_code.co_filename
@@ -126,17 +132,19 @@ _Act = Callable[..., Any]
 
 
 class Patch:
-    """A function that replaces an original function for hosts. Other callers get the original.
+    """Replacement of a function such as `time.sleep` for callers in host code.
+
+    Other callers get the original function.
 
     Args:
         original: the original function.
-        act: the replacement for hosts.
+        act: function that is called instead if the caller is a host.
 
     Attributes:
         original: the original function.
-        act: the replacement for hosts.
-        on: whether the patch is active. If the patch is not active, code that still holds the patch
-            calls the original.
+        act: function that is called instead if the caller is a host.
+        on: whether the replacement is active. If it is not, all callers get the original, also code
+            that still has a reference to this object.
     """
 
     def __init__(self, original: Callable[..., Any], act: _Act) -> None:
@@ -323,14 +331,14 @@ Acts = Mapping[tuple[Any, str], _Act]
 
 
 class Patches:
-    """Replaces functions by patches, from `__enter__` to `__exit__`.
+    """Context manager that replaces functions such as `time.sleep` for host code.
 
-    Patches are installed in modules and classes, and wherever a host's module has stored the
-    function: by `from time import sleep`, as an attribute of a class, or as the default of an
-    argument. Replacements by other patches are restored at the end.
+    The functions are replaced in their modules and classes, and wherever a host's module has stored
+    them: by `from time import sleep`, as an attribute of a class, or as the default of an argument.
+    A function that was already replaced by another patch gets that patch back at the end.
 
     Args:
-        acts: replacements for hosts.
+        acts: replacements for hosts, by owner and name of the function.
     """
 
     def __init__(self, acts: Acts) -> None:

@@ -333,19 +333,19 @@ def _package_of(frame: FrameType) -> str:
 def unpatched_time_fails(
     allowed: Collection[str] = (), others: Collection[threading.Thread] | None = None
 ) -> Iterator[None]:
-    """Raise UnpatchedTimeError if a host sleeps, or reads a clock that does not advance.
+    """Raise UnpatchedTimeError if a host sleeps in real time, or reads the clock of the machine.
 
-    The error is raised at the first such call, with its file and line. If the host has caught the
-    error, it is raised again at the end. If the error caused another exception, that exception gets
-    a note with the error.
+    In virtual time such calls are mistakes. The error is raised at the first such call, with its
+    file and line. If the host has caught the error, it is raised again at the end. If the error
+    caused another exception, that exception gets a note with the error.
 
-    `patched_time` defines host code; within its block nothing is refused. Always allowed are
-    `perf_counter`, `time.time` in installed packages, and functions with which a test has replaced
-    these functions.
+    Host code is defined as for `patched_time`; within a block of `patched_time` all calls are
+    allowed. Always allowed are `perf_counter`, `time.time` in installed packages, and functions
+    with which a test has replaced these functions.
 
     Args:
-        allowed: names of allowed packages.
-        others: allowed threads. The default is all threads that already run.
+        allowed: names of packages whose calls are allowed.
+        others: threads whose calls are allowed. The default is all threads that already run.
     """
     others = threading.enumerate() if others is None else others
     refusals: list[str] = []

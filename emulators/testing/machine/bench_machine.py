@@ -14,7 +14,7 @@ from tickrig.host.text.values import Setting
 
 
 class WorldInput(NamedTuple):
-    """An input of a device that a search may change.
+    """An input of a device that a search for failures may change.
 
     Attributes:
         name: name of the input.
@@ -30,12 +30,14 @@ class WorldInput(NamedTuple):
 
 
 class World:
-    """The faults and inputs that a search may use on a bench.
+    """The faults and inputs of a bench with which a search tries to make a host fail.
 
     Args:
         bench: the bench, in virtual time.
-        faults: names of the faults that may occur, with or without arguments; by default all.
-        inputs: names of the inputs that may change; by default all inputs except objects of nodes.
+        faults: names of the faults that may occur, with or without arguments. The default is all
+            faults.
+        inputs: names of the inputs that may change. The default is all inputs except objects of
+            nodes.
 
     Attributes:
         faults: faults that may occur, by name and arguments.
@@ -125,7 +127,9 @@ _INVARIANT: Final = "_tickrig_invariant"
 
 
 def host_rule(**arguments: object) -> Callable[[F], F]:
-    """Make a method of a `BenchMachine` a rule: an action that a search may execute.
+    """Decorator for a method of a `BenchMachine` that makes it a rule, which a search may call.
+
+    A rule is an action of the host, such as a request.
 
     Args:
         arguments: arguments of the method, each with its possible values. The values are a list, a
@@ -140,9 +144,10 @@ def host_rule(**arguments: object) -> Callable[[F], F]:
 
 
 def invariant() -> Callable[[F], F]:
-    """Make a method of a `BenchMachine` an invariant, which is checked after each tick.
+    """Decorator for a method of a `BenchMachine` that makes it an invariant.
 
-    The method must have no side effects. It raises AssertionError if the invariant is violated.
+    A search calls it after each tick. The method must have no side effects. It raises
+    AssertionError if the invariant is violated.
     """
 
     def mark(method: F) -> F:
@@ -205,16 +210,25 @@ class BenchMachine:
         raise NotImplementedError(f"{type(self).__name__} makes no bench: write make_bench")
 
     def warm_up(self) -> None:
-        """Bring the bench into the state in which each run begins; called once per search."""
+        """Bring the bench into the state in which each run begins.
+
+        A search calls this method once.
+        """
 
     def connect(self) -> None:
-        """Connect the host at the beginning of each run; an exception raised here is a finding."""
+        """Connect the host at the beginning of each run.
+
+        An exception raised here counts as a failure that the search has found.
+        """
 
     def end(self) -> None:
-        """Check the result at the end of each run; call `calm` first if all faults should end."""
+        """Check the result at the end of each run. Override this method for such checks.
+
+        Call `calm` first if all faults should end before the check.
+        """
 
     def disconnect(self) -> None:
-        """Close the resources of the host after each run, whether or not the run has failed."""
+        """Close the host's resources after each run, whether the run has failed or not."""
 
     def calm(self) -> None:
         """End all faults, and restore the values that all inputs had when the run began."""

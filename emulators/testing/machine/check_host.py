@@ -61,7 +61,7 @@ def check_host(
 
 
 def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | None = None) -> Any:
-    """Return the test of Hypothesis that draws steps and runs them.
+    """Return a Hypothesis test that searches for failures of a host, by drawing and running steps.
 
     Raises:
         ModuleNotFoundError: Hypothesis is not installed.
@@ -90,16 +90,16 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
 
 
 def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
-    """Repeat a failure that a search found, without random choices and without Hypothesis.
+    """Repeat a failure that a search has found. This needs no random choices and no Hypothesis.
 
     Args:
-        machine: the bench, the host and its rules.
+        machine: class with the bench, the host and its rules.
         scenario: path of a file with the scenario, or the scenario as a text of several lines.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: the text is not a scenario of this machine. The message names the place.
-        Exception: the exception of the host, a rule or an invariant.
+        ValueError: the text is not a scenario of this machine. The message names file and line.
+        Exception: the exception of the host, a rule or an invariant, if the failure occurs again.
     """
     text, name = str(scenario), "scenario"
     if "\n" not in text:
@@ -115,10 +115,12 @@ def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
 
 
 def note_of(runs: HostRuns, failure: HostFailure, *, repeats: bool = True) -> str:
-    """Return a failure as text: the scenario, the command that replays it, and the last traffic.
+    """Return the description of a failure that a search has found.
+
+    It has the scenario, the command that replays it, and the last traffic before the failure.
 
     Args:
-        runs: the runs of the machine.
+        runs: the runs of the search.
         failure: the failure.
         repeats: whether the run failed again when it was repeated.
     """

@@ -43,17 +43,17 @@ _LINE: Final = re.compile(r"\+(\S+)\s+(\w+)(?:\s+(.*))?")
 
 @dataclass(frozen=True, slots=True, repr=False)
 class HostStep:
-    """A step of a run: a pause, then an action.
+    """One step of a search for failures of a host: a pause, then an action.
 
     Attributes:
-        wait_us: pause before the action.
-        verb: kind of the action: `call` calls a rule, `set`, `press`, `fault` and `send` act on the
+        wait_us: pause before the action, in microseconds.
+        verb: type of the action: `call` calls a rule, `set`, `press`, `fault` and `send` act on the
             bench, `wait` is only a pause, and `seed` sets the seed of faults that begin after this
             step.
         what: name of the rule, or the text that follows the verb in a scenario: `stick_v_pct 50`,
             `drop=0.1`, `705#00`, or bytes in hex. If the bench has several wires, the name of the
             device is in front: `drive/705#00`.
-        for_us: duration of the press of a button, or of a fault.
+        for_us: duration of the press of a button, or of a fault, in microseconds.
         arguments: arguments of the rule.
     """
 
@@ -85,7 +85,9 @@ class HostStep:
         return f"+{_time(self.wait_us)} {self.verb} {what}".rstrip() + lasting
 
     def do(self, bench: Bench) -> None:
-        """Wait, then execute the step on a bench; a `call` needs a machine instead of a bench.
+        """Wait for the pause of this step, then execute its action on a bench.
+
+        A `call` cannot be executed this way, because it needs a machine.
 
         Args:
             bench: the bench.
@@ -118,12 +120,13 @@ class HostStep:
 def parse_steps(
     text: str, file: str, rules: Mapping[str, Mapping[str, object]] | None = None
 ) -> tuple[HostStep, ...]:
-    """Read the steps of a scenario.
+    """Parse a scenario of a search into its steps.
 
     Args:
-        text: content of the file.
-        file: name of the file, for messages.
-        rules: rules of the machine. An argument may be any value that its rule lists.
+        text: content of the scenario file.
+        file: name of the file, for error messages.
+        rules: rules of the machine with their arguments. An argument may be any value that its rule
+            lists.
 
     Raises:
         ValueError: a line is invalid. The message is `FILE:LINE: found text, what is allowed`.
@@ -198,10 +201,10 @@ def _same_text(value: object, text: str) -> bool:
 
 
 def check_written(rule: str, name: str, value: object, listed: object = None) -> None:
-    """Raise TypeError unless a scenario can hold an argument.
+    """Raise TypeError if the value of a rule's argument cannot be written in a scenario.
 
     Args:
-        rule: the rule with this argument.
+        rule: name of the rule.
         name: name of the argument.
         value: value of the argument.
         listed: values that the rule lists, or None if the rule lists no values.
@@ -240,15 +243,15 @@ _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssum
 
 @dataclass(frozen=True, slots=True)
 class HostFailure:
-    """How and where a run of a `BenchMachine` failed.
+    """A failure of a run of a `BenchMachine`: the exception, where it was raised, and when.
 
     Attributes:
-        error: exception of the run.
-        violated: place that raised the exception, such as `invariant it_is_slow`, `rule drive`,
-            `connect`, `end`.
-        at_us: time of the failure on the bench.
-        steps: the steps before the failure.
-        passed: the last traffic before the failure.
+        error: exception that was raised.
+        violated: part of the machine that raised the exception, such as `invariant it_is_slow`,
+            `rule drive`, `connect`, `end`.
+        at_us: time of the failure on the bench, in microseconds.
+        steps: steps of the run before the failure.
+        passed: last traffic before the failure, as text.
     """
 
     error: BaseException
@@ -285,7 +288,7 @@ def _seeded() -> Iterator[None]:
 
 
 class HostRuns:
-    """Runs of one machine; a context manager that keeps the bench open.
+    """Runs a `BenchMachine` many times on one bench, which it keeps open as a context manager.
 
     Args:
         kind: class of the machine.
@@ -343,7 +346,7 @@ class HostRuns:
         self._stack.close()
 
     def run(self, steps: Sequence[HostStep]) -> None:
-        """Run the steps from the snapshot; raise the exception of the host.
+        """Restore the snapshot of the bench and execute steps; raise an exception of the host.
 
         Raises:
             HostHangsError: the host waits without end.
@@ -377,10 +380,10 @@ class HostRuns:
             self.machine.disconnect()
 
     def shorten(self, failure: HostFailure) -> HostFailure | None:
-        """Remove the steps that are not needed for a run to fail in the same way.
+        """Remove steps from a failed run as long as the run still fails in the same way.
 
         Returns:
-            The failure without unnecessary steps, or None if the run does not fail again.
+            The failure with the remaining steps, or None if the run does not fail again.
         """
         failed = self._again(failure, failure.steps)
         shorter = failed

@@ -54,11 +54,11 @@ def timing() -> st.SearchStrategy[int]:
 def faults(
     bench: Bench, names: Sequence[str] | None = None, for_: Sequence[str] = ("100ms", "1s")
 ) -> st.SearchStrategy[HostStep]:
-    """Draw temporary faults; `step.do(bench)` starts the fault.
+    """Return a Hypothesis strategy for temporary faults; `step.do(bench)` starts the drawn fault.
 
     Args:
         bench: the bench with the faults.
-        names: names of the faults. By default all faults of the bench are drawn.
+        names: names of the faults to draw from. The default is all faults of the bench.
         for_: possible durations of a fault.
 
     Raises:
@@ -68,12 +68,14 @@ def faults(
 
 
 def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrategy[HostStep]:
-    """Draw manual actions: pressed buttons, changed levels. `step.do(bench)` executes the action.
+    """Return a Hypothesis strategy for manual actions: pressed buttons and changed levels.
+
+    `step.do(bench)` executes the drawn action.
 
     Args:
         bench: the bench with the inputs.
-        names: names of inputs and buttons. By default all of the bench are drawn, except the
-            objects of nodes.
+        names: names of the inputs and buttons to draw from. The default is all of the bench except
+            the objects of nodes.
 
     Raises:
         ValueError: an input is unknown.
@@ -82,10 +84,13 @@ def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrat
 
 
 def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
-    """Draw traffic of other participants; `step.do(bench)` sends the traffic.
+    """Return a Hypothesis strategy for traffic of other hosts.
+
+    `step.do(bench)` sends the drawn traffic.
 
     Args:
-        words: frames in candump's notation, or bytes in hex, as in `HostStep.what`.
+        words: traffic to draw from: frames in candump's notation, or bytes in hex, as in
+            `HostStep.what`.
     """
     return st.builds(HostStep, timing(), st.just("send"), st.sampled_from(words))
 
@@ -147,7 +152,7 @@ def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostS
 
 
 def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]:
-    """Draw a run: half of the steps are calls.
+    """Return a Hypothesis strategy for the steps of a run. On average half of them call a rule.
 
     Args:
         machine: the machine with the rules and its bench.

@@ -27,7 +27,9 @@ samples."""
 
 
 class SignalSampler:
-    """Records the values of some signals; an unchanged value takes no memory.
+    """Records how signals of a device change over time, for curves and reports.
+
+    Only changes take memory.
 
     Args:
         device: the device with the signals.
@@ -46,10 +48,13 @@ class SignalSampler:
             self._find(name)
 
     def take(self, now_us: int) -> None:
-        """Read the signals: after each step (`Rig.watchers`), and once at the end.
+        """Record the present values of the signals.
+
+        The rig calls this method after each step, as one of its `watchers`. It is also called at
+        the end.
 
         Args:
-            now_us: time, which is not earlier than in the last call.
+            now_us: present time in microseconds, which is not earlier than in the last call.
         """
         for name, points in self._points.items():
             value = read_signal(self._device, name)
@@ -178,16 +183,16 @@ _SAMPLES: Final = 1_000
 
 
 class BenchEvidence(NamedTuple):
-    """Data of a bench for a report.
+    """What a report shows about the bench of a test.
 
     Attributes:
-        mode: mode of the bench.
-        now_us: time at which the bench was closed.
-        journal: the last events.
-        left_out: number of earlier lines.
+        mode: mode of the bench: `virtual`, `real` or `hardware`.
+        now_us: time of the bench when it was closed, in microseconds.
+        journal: last events on the bench.
+        left_out: number of earlier lines that are not in `journal`.
         faults: requested faults, and faults that occurred.
-        series: signals that changed.
-        trace: trace of the bench, for `tickrig replay`, or empty if nothing was recorded.
+        series: values of the signals that changed.
+        trace: recording of the bench for `tickrig replay`, or empty if nothing was recorded.
     """
 
     mode: str
@@ -200,7 +205,7 @@ class BenchEvidence(NamedTuple):
 
 
 class BenchWitness:
-    """Collects data of a bench for a report, from its beginning.
+    """Collects what a report shows about a bench, while a test uses the bench.
 
     Args:
         bench: the bench.

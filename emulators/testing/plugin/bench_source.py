@@ -71,7 +71,7 @@ def _fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
 
 
 class WantedBench(NamedTuple):
-    """The bench that a test requests.
+    """The bench that a pytest test requests.
 
     Attributes:
         source: description of the devices on the bench.
@@ -88,7 +88,10 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return the request with the devices made for this test, and with complete paths.
+        """Return the same request with the devices made for this test, and with complete paths.
+
+        Args:
+            item: the test.
 
         Raises:
             ValueError: there is no device, or another test has used the devices.
@@ -103,7 +106,7 @@ class WantedBench(NamedTuple):
         return self._replace(source=_placed(made, self.folder))
 
     def open(self) -> Bench:
-        """Make the bench that the test requests.
+        """Open the bench that the test requests.
 
         Raises:
             ValueError: the configuration is not valid.
@@ -136,7 +139,7 @@ class WantedBench(NamedTuple):
 
     @property
     def safe(self) -> Mapping[str, Mapping[str, Setting]]:
-        """Values that the rig file requires of outputs after a test, by device and name."""
+        """Values that the rig file requires of outputs after a test, by device and output."""
         return plan_of(self.source).safe if isinstance(self.source, Path) else {}
 
     @property
@@ -181,7 +184,7 @@ def _placed_device(device: Any, folder: Path) -> Any:
 
 
 def plan_of(path: Path) -> RigPlan:
-    """Return the plan of a rig file; the file is read again only after a change.
+    """Return the content of a rig file. The file is read again only if it has changed.
 
     Raises:
         OSError: the file cannot be read.
@@ -212,7 +215,7 @@ def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
 
 
 def allowed_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names in all markers `allows` of a test.
+    """Return what the markers `allows` of a test allow, as names.
 
     Raises:
         ValueError: a name is unknown.
@@ -225,7 +228,7 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names in all markers `needs` of a test, in the order in which the test has them.
+    """Return what the markers `needs` of a test require of its bench, as names in their order.
 
     Raises:
         ValueError: a name is unknown.
@@ -248,7 +251,7 @@ def check_mode(needs: Iterable[str], mode: str) -> None:
 
 
 def check_needs(needs: Iterable[str], bench: Bench) -> None:
-    """Raise NotOnThisBench unless a bench has everything that a test needs.
+    """Raise NotOnThisBench if a bench lacks something that a test needs.
 
     Raises:
         ValueError: a name is misspelt, so that every bench would skip the test.
@@ -332,12 +335,12 @@ SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
 
 
 def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
-    """Return the bench for a test after the warm-up; in virtual time a twin replaces the bench.
+    """Run the warm-up of a test on its bench, and return the bench for the test.
 
-    Hosts, triggers and tasks of the warm-up are removed.
-
-    A snapshot replaces the warm-up only if the result is the same. The bench before the warm-up
-    must be equal except for its seed, and the warm-up must not have drawn random numbers.
+    In virtual time the returned bench may be a copy of one on which the warm-up ran for an earlier
+    test. A copy is used only if the result is the same: the bench before the warm-up must be equal
+    except for its seed, and the warm-up must not have drawn random numbers. Hosts, triggers and
+    tasks of the warm-up are removed.
 
     Raises:
         ValueError: the bench cannot be copied after the warm-up, although it could be copied

@@ -103,7 +103,7 @@ class _BenchedTest(TestWithBench):
         self._is_misused = False
 
     def open(self) -> Bench:
-        """Open the bench.
+        """Open the bench of the test, run its warm-up, and start the checks of the bench.
 
         Raises:
             NotOnThisBench: the bench lacks something that the test needs.
@@ -138,7 +138,10 @@ class _BenchedTest(TestWithBench):
         self._is_misused = True
 
     def close(self) -> None:
-        """Release all resources; a passed test fails if an error has occurred after its body."""
+        """Close the bench of the test.
+
+        A passed test fails if an error has occurred since the end of its body.
+        """
         since = self.take_unheard() if self._passed else []
         with self._stack:
             if self.bench is not None:
@@ -172,7 +175,10 @@ class _BenchedTest(TestWithBench):
 
     @contextmanager
     def judged(self) -> Iterator[None]:
-        """Fail the test if it uses a wrong clock, or leaves its bench in a bad state."""
+        """Check the test that runs in this `with` block.
+
+        The test fails if it uses the clock of the machine, or leaves its bench in a bad state.
+        """
         assert self.bench is not None
         over = False
         try:
@@ -209,11 +215,14 @@ class _BenchedTest(TestWithBench):
     def judge(
         self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
     ) -> None:
-        """Report the reason if a phase of the test is blocked, and add the evidence to a failure.
+        """Complete pytest's report of a phase of the test with data of the bench.
+
+        If the bench blocked the phase, the report gets the reason. The report of a failure gets the
+        evidence of the bench.
 
         Args:
-            report: report of the phase.
-            call: the call of the phase.
+            report: report of the phase: setup, call or teardown.
+            call: result of the phase.
             mistaken: whether the test itself is wrong.
         """
         try:
@@ -255,7 +264,10 @@ def benched(
 
 @contextmanager
 def clocked(bench: Bench) -> Iterator[Any]:
-    """Run a test with the clock of its bench; a host that waits where it cannot fails the test."""
+    """Run a test with the clock of its bench in place of the machine's.
+
+    If a host waits where it cannot wait, such as in a callback, the test fails.
+    """
     try:
         with bench.patched_time() as clock:
             yield clock

@@ -24,7 +24,9 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 
 
 class Fingerprint:
-    """Records what happens on a bench: traffic, and changes of signals.
+    """Records everything that happens on a bench, in order to compare two runs of a test.
+
+    These are the traffic, and the changes of signals.
 
     Args:
         rig: the rig of the bench.
@@ -55,7 +57,7 @@ class Fingerprint:
         return sha256("\n".join(self.lines).encode()).hexdigest()
 
     def difference(self, other: Fingerprint) -> str:
-        """Return the first line that differs from another run, or "" if all lines are equal."""
+        """Return the first difference between this run and a second run, or "" if there is none."""
         pairs = zip_longest(self.lines, other.lines, fillvalue="nothing")
         for number, (first, second) in enumerate(pairs, 1):
             if first != second:
@@ -94,7 +96,7 @@ _Reports = list[pytest.TestReport]
 
 
 class Compare:
-    """The pytest plug-in of `--bench-compare`, which runs each test twice.
+    """pytest plug-in for `--bench-compare`: runs each test twice, and compares the two runs.
 
     Args:
         config: the configuration of pytest.

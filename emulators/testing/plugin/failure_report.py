@@ -32,7 +32,7 @@ _MOST: Final = 80
 
 
 def stem_of(nodeid: str) -> str:
-    """Return the base name of the files of a test, which has no path and is unique to the test.
+    """Return the base name of a test's files, made from its node ID; it is unique to the test.
 
     >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
     'tests_test_stop.py_test_it_stops_fast-24cfca'
@@ -42,7 +42,7 @@ def stem_of(nodeid: str) -> str:
 
 
 def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]]:
-    """Write the files of a test.
+    """Write the files about a failed test, such as the trace of its bench.
 
     Args:
         bench: bench of the test, which is still open.
@@ -108,7 +108,7 @@ _WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
 
 
 def outcome_of(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> tuple[Outcome, str, str]:
-    """Return the outcome of a test, the reason in one line, and pytest's text.
+    """Return the outcome of a test, its reason in one line, and pytest's text about the failure.
 
     Args:
         item: the test.

@@ -33,7 +33,7 @@ LOST: Final = "lost"
 
 
 class Health:
-    """Records errors and lost data on the wires of a bench, from its beginning.
+    """Records errors and lost data on the wires of a bench, for the verdict of a test.
 
     Errors or losses on a wire are no problem if a fault of this wire, or of any device, occurred
     before. A line on which no host has sent anything may overflow, because no host reads the line.
@@ -53,10 +53,10 @@ class Health:
             self._mode.act(self._begin)
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
-        """Return the problems, one text for each; empty if there are no problems.
+        """Return the problems found on the wires of the bench, as one text for each problem.
 
         Args:
-            allowed: permitted problems: `ERRORS`, `LOST`.
+            allowed: problems that the test permits: `ERRORS`, `LOST`.
         """
         found = [] if ERRORS in allowed else list(self._errors.values())
         with suppress(NotOnThisBench):
@@ -147,11 +147,13 @@ SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
 def with_plan(
     safe: SafeState, plan: Mapping[str, Mapping[str, Setting]], bench: Bench
 ) -> SafeState:
-    """Return the safe values of rig file and fixture; values of the fixture have priority.
+    """Return the required values of outputs after a test, from fixture and rig file together.
+
+    Values of the fixture have priority.
 
     Args:
-        safe: safe values of the fixture.
-        plan: safe values of the rig file, by device and output.
+        safe: required values of the fixture, or its check.
+        plan: required values of the rig file, by device and output.
         bench: the bench.
     """
     alone = len(bench.devices) == 1
@@ -180,7 +182,7 @@ def _short(name: str, bench: Bench) -> str:
 
 
 def check_safe(bench: Bench, safe: SafeState) -> None:
-    """Raise ValueError if a safe value is for an output that the bench does not have."""
+    """Raise ValueError if a value is required of an output that the bench does not have."""
     for name in safe if isinstance(safe, Mapping) and bench.mode != HARDWARE else ():
         bench.get(name)
 
@@ -209,13 +211,14 @@ THREADS: Final = "threads"
 
 @contextmanager
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
-    """Record name, place and error of threads that start during the test and end with an error.
+    """Record threads that start during the test and end with an exception, in a `with` block.
 
-    For threads that started before the test, only pytest's warning appears, which covers all
-    threads. A thread that ends by `sys.exit()` is recorded only if its exit status is an error.
+    Name, line and exception are recorded. For threads that started before the test, only pytest's
+    warning appears, which covers all threads. A thread that ends by `sys.exit()` is recorded only
+    if its exit status is an error.
 
     Args:
-        note: function that is called with a line, in the thread that dies.
+        note: function that is called with a line of text, in the thread that ends.
     """
     others, before = set(threading.enumerate()), threading.excepthook
 
@@ -267,10 +270,12 @@ _TOLD: Final = re.compile(r"coroutine '(.*)' was never awaited(?s:.*)  File \"(.
 
 @contextmanager
 def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
-    """Record coroutines that are discarded without being awaited, regardless of warning filters.
+    """Record coroutines that are discarded without being awaited, during a `with` block.
+
+    They are recorded regardless of warning filters.
 
     Args:
-        note: function that is called with a line for each coroutine.
+        note: function that is called with a line of text for each coroutine.
     """
     depth = sys.get_coroutine_origin_tracking_depth()
     with warnings.catch_warnings():
@@ -301,12 +306,14 @@ LONG_WAITS: Final = "long waits"
 def guard(
     mode: str, allowed: Container[str], others: Collection[Thread]
 ) -> AbstractContextManager[None]:
-    """Return a guard that fails a test in virtual time if it uses the clock of the machine.
+    """Return a context manager that fails a test in virtual time if it uses the machine's clock.
+
+    In other modes, or if the test may use this clock, the context manager does nothing.
 
     Args:
         mode: mode of the bench.
-        allowed: names that the markers of the test allow.
-        others: threads that ran before the bench was opened.
+        allowed: names that the markers `allows` of the test allow.
+        others: threads that ran before the bench was opened. They may use the machine's clock.
     """
     if mode != VIRTUAL or CLOCK in allowed:
         return nullcontext()

@@ -49,7 +49,7 @@ def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
 
 
 def fault_names(bench: Bench) -> tuple[set[str], set[str]]:
-    """Return the names of the faults of all wires, and of the faults of all devices."""
+    """Return the names of all wire faults of a bench, and of all faults of its devices."""
     described = bench.describe()
     physical = {name for name in described.faults if name in described.inputs}
     return described.faults.keys() - physical, physical
@@ -66,9 +66,9 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
 
 
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
-    """Return each line of the journal with its text; a frame is followed by its meaning.
+    """Yield the lines of a bench's journal, each with its text; a CAN frame is decoded.
 
-    PDOs are decoded too, even if their mapping was written before the first kept line.
+    PDOs are decoded even if their mapping was written before the first kept line.
     """
     meanings, buses = decoder.Decoder(), buses_of(bench)
     for line in bench._mode.mappings():
@@ -81,9 +81,9 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 
 
 def last_lines(bench: Bench, count: int) -> str:
-    """Return the last events on a bench, each with time, place, direction and text.
+    """Return the last events on a bench as lines of text with time, wire, direction and content.
 
-    Incomplete lines are at the end.
+    Lines that were not complete at the end come last.
     """
     described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]
@@ -94,7 +94,7 @@ def last_lines(bench: Bench, count: int) -> str:
 
 
 def frame_of(line: WireLine) -> CanFrame | ErrorFrame | None:
-    """Return the frame in a line of a CAN bus, or None for a fault and its effect on a frame."""
+    """Return the CAN frame of a journal line, or None if the line is an action or about a fault."""
     if line.mark in {Mark.PHYSICAL, Mark.WIRE}:
         return None
     text = line.data.decode()

@@ -12,7 +12,9 @@ from tickrig.host.text.values import parse_setting
 
 
 class ParameterPlugin:
-    """Gives tests the values of `--bench-param`, which replace the fixture with the same name.
+    """pytest plug-in for `--bench-param`: runs tests with each given value of a parameter.
+
+    The values replace the fixture with the name of the parameter.
 
     Args:
         config: the configuration of pytest.
@@ -25,7 +27,7 @@ class ParameterPlugin:
         self._names: dict[str, None] = {}
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
-        """Run a test with each value.
+        """Hook of pytest: run a test with each value of its `--bench-param` parameters.
 
         Raises:
             Collector.CollectError: the test already has its own values for the parameter.

@@ -139,20 +139,26 @@ def _check_markers(collector: pytest.Collector, item: pytest.Function) -> None:
 
 @pytest.fixture
 def bench_config(request: pytest.FixtureRequest) -> BenchSource:
-    """The devices of the bench; override it to return a device, arguments, or a rig file."""
+    """Fixture that describes the bench: override it to return a device, arguments or a rig file."""
     source: BenchSource = getattr(request, "param", None)
     return source
 
 
 @pytest.fixture
 def bench_safe() -> SafeState:
-    """The safe values of outputs after a test; override it to return values by name, or a check."""
+    """Fixture with the values that outputs must have after a test.
+
+    Override it to return values by name, or a function that checks the bench.
+    """
     return None
 
 
 @pytest.fixture
 def bench_warm_up() -> WarmUp:
-    """The preparation of the bench before a test; override it to return a function of the bench."""
+    """Fixture that prepares the bench before a test.
+
+    Override it to return a function that gets the bench.
+    """
     return None
 
 
@@ -188,7 +194,10 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """Skip a test that its bench cannot run; fail a test that leaves its bench in a bad state."""
+    """Hook of pytest that skips a test if its bench cannot run it.
+
+    A test that leaves its bench in a bad state fails.
+    """
     test = item.stash.get(BENCHED, None)
     if test is None:
         return (yield)
@@ -200,7 +209,10 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Complete the reports of tests that have a bench, or that are blocked without a bench."""
+    """Hook of pytest that completes the report of a test with data of its bench.
+
+    If the bench blocked the test, the report becomes an error with the reason.
+    """
     if (test := item.stash.get(BENCHED, None)) is None:
         report = yield
         if call.excinfo is not None and is_blocked(call.excinfo.value):
@@ -218,7 +230,10 @@ def pytest_runtest_makereport(
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Run an async test on its bench, unless another plug-in (such as asyncio) runs the test."""
+    """Hook of pytest that runs an async test in the time of its bench.
+
+    Tests that another plug-in (such as pytest-asyncio) runs are left to that plug-in.
+    """
     test = pyfuncitem.stash.get(BENCHED, None)
     if test is None or not iscoroutinefunction(pyfuncitem.obj):
         return None

@@ -39,11 +39,11 @@ _Place = tuple[str, int, list[tuple[int, str]]]
 
 
 class ReportPlugin:
-    """The pytest plug-in of `--bench-report`, which writes a report of all tests.
+    """pytest plug-in for `--bench-report`: writes a report about all tests.
 
     Args:
         config: the configuration of pytest.
-        settings: the settings of the plug-in, with a report.
+        settings: the settings of the plug-in, with the path of the report.
 
     Raises:
         OSError: the file with the requirements cannot be read.

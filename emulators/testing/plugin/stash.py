@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 class TestWithBench(ABC):
-    """A test with a bench, as hooks and reports use it.
-
-    Args:
-        item: the test.
-        wanted: bench that the test requested.
+    """State that the pytest plug-in keeps for a test with a bench.
 
     Attributes:
         bench: bench of the test, once the bench is open.
         evidence: data of the bench for a report, once the bench is closed.
         blocked: reason why the test came to no verdict, or empty if it came to a verdict.
         unheard: errors outside the body of the test that were not reported yet, one per line.
-        kept: files that were kept.
-        not_kept: reasons why other files were not kept, or not completely, one per line.
+        kept: files about a failed test that were written.
+        not_kept: reasons why other files were not written, or not completely, one per line.
+
+    Args:
+        item: the test.
+        wanted: bench that the test requested.
     """
 
     __test__ = False
@@ -53,7 +53,10 @@ class TestWithBench(ABC):
 
     @abstractmethod
     def judged(self) -> AbstractContextManager[None]:
-        """Fail the test if it uses a wrong clock, or leaves its bench in a bad state."""
+        """Return a context manager in which the test runs and is checked.
+
+        The test fails if it uses the clock of the machine, or leaves its bench in a bad state.
+        """
 
     @abstractmethod
     def judge(

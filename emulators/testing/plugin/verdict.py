@@ -47,11 +47,13 @@ def blocked(
     *,
     mistaken: bool = False,
 ) -> str:
-    """Return why a phase of a test gave no verdict about the device, or "" if it gave a verdict.
+    """Return why a phase of a test gave no verdict about the device, or "" if it gave one.
+
+    An example is a machine that was too slow.
 
     Args:
         report: report of the phase.
-        call: the call of the phase.
+        call: result of the phase.
         bench: bench of the test, or None if the bench was not opened.
         mistaken: whether the test itself is wrong; see `is_mistake`.
     """
@@ -64,11 +66,11 @@ def blocked(
 
 
 def is_mistake(error: BaseException) -> bool:
-    """Return whether a test would raise this error on a fast machine, too.
+    """Return whether an error is a mistake in the test, which would occur on a fast machine, too.
 
-    A misspelt name is a mistake in the test. A call that the bench refuses is a mistake, too. The
-    use of None as a message is not a mistake, because the message may have arrived too late. An
-    exception that the host itself raises is not a mistake either.
+    A misspelt name is such a mistake, and so is a call that the bench refuses. The use of None as a
+    message is not a mistake, because the message may have arrived too late. An exception that the
+    host itself raises is not a mistake either.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))
@@ -92,11 +94,11 @@ def _raiser(error: BaseException) -> str:
 
 
 def end_at_caller(error: BaseException) -> None:
-    """Remove tickrig's frames from the end of a traceback, if a call of tickrig was refused.
+    """Shorten a traceback, so that it ends at the line of the user that called tickrig.
 
-    They are also removed if a host waits endlessly, so that the line that waits is the last one. If
-    code of the user that tickrig has called raises, such as a condition, tickrig's frames between
-    the test and this code are removed.
+    That is done if tickrig has refused a call, or if a host waits endlessly. If a function of the
+    user that tickrig has called raises, such as a condition, tickrig's frames between the test and
+    this function are removed.
 
     Args:
         error: the exception of the test.
@@ -141,7 +143,14 @@ def _package_of(entry: TracebackType) -> str:
 
 
 def make_error(report: pytest.TestReport, reason: str) -> None:
-    """Replace a failure of the device, or an expected failure, by an error of the bench."""
+    """Turn the report of a failed test into an error with a problem of the bench as its reason.
+
+    An expected failure becomes an error, too.
+
+    Args:
+        report: report of the test.
+        reason: description of the problem.
+    """
     report.outcome = "failed"
     report.__dict__.pop("wasxfail", None)  # a fault of the bench is unexpected
     if report.when == "call":

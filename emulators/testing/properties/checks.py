@@ -286,19 +286,25 @@ _KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True
 
 
 class DeviceChecks:
-    """The checks of one device type.
+    """Property-based checks of one device type; each check runs a session of host and environment.
 
     Args:
         bench: function that makes a bench with one device.
         remembers: whether a reset keeps more than configuration and inputs.
-        pauses: whether pauses within the host's traffic have no effect.
+        pauses: whether pauses within the host's traffic have no effect on the device.
     """
 
     def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:
         self._bench, self._remembers, self._pauses = bench, remembers, pauses
 
     def check_ticks(self, session: Session) -> None:
-        """Check that the choice of ticks and the pieces written by the host have no effect."""
+        """Check that a device behaves the same whether it is called in every tick or only when due.
+
+        The size of the chunks in which the host writes must have no effect either.
+
+        Args:
+            session: actions of host and environment, one after the other.
+        """
         bench, played = self._bench, self._bench()
         acts = played.with_end([*played.start, *session])  # it ticks at least once
         check_acts(bench(start=()).device, acts, played.nothing)

@@ -28,14 +28,14 @@ def must(holds: bool, text: str) -> None:
 
 
 def check_members(device: Any, nothing: Any) -> None:
-    """Check that a device has the attributes of every device.
+    """Check that an object has the attributes of every device, and a valid period.
 
     Args:
         device: the device, which is not changed.
-        nothing: empty traffic.
+        nothing: empty traffic of the type that the device uses: bytes or frames.
 
     Raises:
-        AssertionError: an attribute is missing, or a period is invalid.
+        AssertionError: an attribute is missing, or the period is invalid.
     """
     kind = type(device).__name__
     for name, text in (_MEMBERS | _SIGNALS if nothing == b"" else _MEMBERS).items():
@@ -58,12 +58,12 @@ def _check_due(device: Any) -> None:
 
 
 def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
-    """Execute acts on a device without a wire, and check the types of all returned values.
+    """Execute actions on a device without a wire, and check the types of all returned values.
 
     Args:
         device: a new device.
-        acts: the acts to execute.
-        nothing: empty traffic.
+        acts: actions of host and environment.
+        nothing: empty traffic of the type that the device uses: bytes or frames.
 
     Raises:
         AssertionError: a value has a wrong type, or `inputs.changed` stays set.

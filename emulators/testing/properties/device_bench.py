@@ -28,15 +28,17 @@ Observation = tuple[Any, ...]
 
 @dataclass
 class DeviceBench:
-    """A device on its wire, with a host at the other end; the bench records all observations.
+    """A device on a wire with a host that plays a session, for the property-based checks.
+
+    Everything that the host and the outputs of the device show is recorded.
 
     Attributes:
         make: function that makes the device.
         wire: function that makes the wire.
-        start: the acts before the session.
-        dense: whether the rig runs every tick.
+        start: actions before the session.
+        dense: whether the rig calls the device in every tick, not only when it is due.
         pieces: whether the host writes byte by byte, or frame by frame.
-        trace: whether to record the device.
+        trace: file in which the device is recorded, or None to record nothing.
     """
 
     make: Callable[[], Any]
@@ -102,10 +104,17 @@ def outputs_of(device: Any) -> list[Any]:
 
 
 def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Observation]:
-    """Play a session with a device that has no wire.
+    """Play a session with a device that has no wire, and return what was observed.
+
+    Args:
+        device: the device.
+        now_us: time at which the session begins, in microseconds.
+        session: actions of host and environment.
+        nothing: empty traffic of the type that the device uses: bytes or frames.
 
     Returns:
-        The sent traffic and the observations, with times relative to `now_us`.
+        The traffic and the outputs of the device after each action, with times relative to
+        `now_us`.
     """
     log, begin_us = [], now_us
     for wait_us, verb, what in [*session, (_AFTERWARDS_US, "send", nothing)]:
@@ -160,7 +169,7 @@ def due_text(due_us: int) -> str:
 def difference(
     device: Any, one: Sequence[Observation], other: Sequence[Observation], first: str, second: str
 ) -> str:
-    """Return the first difference between two runs, or "" if the runs are equal.
+    """Return a description of the first difference between two runs of a device, or "" if equal.
 
     Args:
         device: the device with the outputs.
@@ -203,13 +212,14 @@ def shorten(value: Any) -> str:
 
 
 def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Session) -> str:
-    """Return a text with the first difference of dense and sparse ticks, and with `due_us`.
+    """Explain a failed check of ticks: return the first difference, and what `due_us` was.
 
-    With dense ticks a device is called at every tick, with sparse ticks only when it is due.
+    With dense ticks a device is called at every tick, with sparse ticks only when it is due. If
+    both give different results, `due_us` is wrong.
 
     Args:
         bench: function that makes a bench.
-        start: the acts before the session.
+        start: actions before the session.
         session: a session in which dense and sparse ticks differ.
     """
     sparse, dense = bench(start=()), bench(start=(), dense=True)
@@ -234,11 +244,11 @@ _T = TypeVar("_T")
 
 
 def shortened(acts: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
-    """Return the acts without those that the failure does not need.
+    """Remove actions from a failed session as long as the session still fails.
 
     Args:
-        acts: acts that fail together.
-        fails: function that returns whether a shorter list of acts fails in the same way.
+        acts: actions with which the check fails.
+        fails: function that returns whether a shorter list of actions fails in the same way.
 
     >>> shortened([1, 2, 3, 4], lambda fewer: 2 in fewer and 4 in fewer)
     [2, 4]

@@ -18,7 +18,7 @@ Session = Sequence[Act]
 
 
 def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrategy[bytes]:
-    """Draw bytes that a host writes at once to a serial line.
+    """Return a Hypothesis strategy for bytes that a host writes at once to a serial line.
 
     Args:
         lines: lines that the device understands. Half of the drawn bytes are such lines, the other
@@ -48,11 +48,13 @@ def _check_words(words: object) -> None:
 def frames(
     known: Sequence[str] = (), can_ids: Sequence[int] = (), most: int = 4
 ) -> st.SearchStrategy[Frames]:
-    """Draw frames that a host sends at once: data and remote frames, also with 29-bit identifiers.
+    """Return a Hypothesis strategy for CAN frames that a host sends at once.
+
+    These are data and remote frames, also with 29-bit identifiers.
 
     Args:
         known: frames that the device understands, in candump's notation, such as `601#40...`.
-        can_ids: identifiers that the device receives. Other identifiers are drawn too.
+        can_ids: identifiers that the device receives. Other identifiers are drawn, too.
         most: largest number of frames at once.
     """
     noise_ids = st.integers(0, 0x7FF)
@@ -74,13 +76,22 @@ def _remote(can_id: int, extended: bool, length: int) -> CanFrame:
 
 
 def waits(tick_us: int) -> st.SearchStrategy[int]:
-    """Draw the duration of a wait in microseconds, around multiples of ticks and up to seconds."""
+    """Return a Hypothesis strategy for the duration of a wait in microseconds.
+
+    Durations are near multiples of the tick, and up to seconds.
+
+    Args:
+        tick_us: period of the device in microseconds.
+    """
     near = [0, 1, tick_us // 2, tick_us - 1, tick_us, tick_us + 1, 3 * tick_us, 10 * tick_us]
     return st.sampled_from([*near, 20_000, 100_000, 310_000, 1_500_000])
 
 
 def values(item: InputSignal) -> st.SearchStrategy[float]:
-    """Draw values in the range of a physical input; its limits, 0 and 1 are more frequent."""
+    """Return a Hypothesis strategy for the values of a physical input.
+
+    The limits of the input, 0 and 1 are drawn more often than other values.
+    """
     low, high = item.low, item.high
     ends = [value for value in (low, high, 0, 1) if low <= value <= high]
     if item.real:
@@ -98,12 +109,14 @@ def input_changes(device: Device[Any]) -> st.SearchStrategy[tuple[str, float]]:
 def sessions(
     device: Device[Any], traffic: st.SearchStrategy[Any], most: int = 15
 ) -> st.SearchStrategy[Session]:
-    """Draw acts of a host and of the environment on a device, one after the other.
+    """Return a Hypothesis strategy for sessions of a device.
+
+    A session has actions of a host and of the environment, one after the other.
 
     Args:
         device: a device of the same type, which is not changed.
         traffic: strategy for the traffic that a host sends at once; see `chunks` and `frames`.
-        most: largest number of acts.
+        most: largest number of actions.
     """
     wait = waits(device.tick_us)
     sent = st.tuples(wait, st.just("send"), traffic)

@@ -23,7 +23,7 @@ Value = int | float | str | None
 
 
 class Outcome(StrEnum):
-    """Outcome of a test, in the order in which the report lists tests.
+    """Outcome of a test in a bench report. Tests are listed in the order of these values.
 
     Attributes:
         FAILED: the device or the host did not behave as expected.
@@ -44,7 +44,9 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunEnvironment:
-    """Environment and settings of a test run, which are equal for all workers of a parallel run.
+    """Environment and settings of a test run, for a bench report.
+
+    They are equal for all workers of a parallel run.
 
     Attributes:
         date: start of the run, as text.
@@ -78,10 +80,10 @@ class RunEnvironment:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A requirement that tests must show to be met.
+    """A requirement on the device or host, which tests name to show that it is met.
 
     Attributes:
-        name: name, as in the marker `req`, such as `SAF-12`.
+        name: name of the requirement, as in the marker `req`, such as `SAF-12`.
         text: the requirement as readable text.
     """
 
@@ -91,14 +93,14 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault that a test requested, or that occurred without a request.
+    """A fault in a bench report: one that a test requested, or one that occurred without a request.
 
     Attributes:
         name: name as in the request, with device and rate: `left_drive/flip=0.01`.
         from_us: time at which the fault began, or None if its trigger did not occur.
         to_us: time at which the fault ended, or None if the fault stayed.
-        when: trigger, such as `the 3rd OK:output`, or a time that was not reached. The text is
-            empty if the fault began at its time.
+        when: trigger of the fault, such as `the 3rd OK:output`, or its start time if that was not
+            reached. The text is empty if the fault began at its time.
         ordered_us: time at which the fault was requested, or None if unknown, as for a manual
             fault.
     """
@@ -111,14 +113,15 @@ class PlannedFault:
 
 
 class JournalLine(NamedTuple):
-    """An event: a line or decoded frame on a wire, an action, or a changed output.
+    """An event in the journal of a bench report: traffic, an action, or a changed output.
 
     Attributes:
-        at_us: time of the event on the bench.
+        at_us: time of the event on the bench, in microseconds.
         source: name of the device or wire, or empty if there is only one.
-        mark: mark of the direction, as in transcripts: `>` to the device, `<` from the device, `!`
-            an action, `*` an output, `?` a missed expectation.
-        text: the event as readable text. Bytes are escaped as in traces.
+        mark: mark of the event, as in transcripts: `>` traffic to the device, `<` traffic from the
+            device, `!` an action, `*` an output, `?` a missed expectation.
+        text: the event as readable text, such as a line or a decoded frame. Bytes are escaped as in
+            traces.
     """
 
     at_us: int
@@ -129,14 +132,15 @@ class JournalLine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SignalSeries:
-    """The samples of a signal.
+    """Values of a signal over time, for a curve in a bench report.
 
     Attributes:
         name: name of the signal, with its device if there are several devices: `left_drive/state`.
         unit: unit of the numbers, or empty if they have no unit.
-        points: pairs of time and value, with times of the bench in ascending order. Equal times may
-            occur.
-        steps: whether a value holds until the next value. Words always hold.
+        points: pairs of time in microseconds and value, with times in ascending order. Equal times
+            may occur.
+        steps: whether a value holds until the next value. If false, a line connects the values.
+            Words always hold.
     """
 
     name: str
@@ -213,14 +217,14 @@ class TestRecord:
 
 @dataclass(frozen=True, slots=True)
 class BenchReport:
-    """A test run, or several merged test runs.
+    """Bench report about a test run, or about several merged test runs.
 
     Attributes:
-        title: title of the page.
+        title: title of the report's page.
         runs: environments in which the tests ran, without duplicates.
         tests: tests in the order of the report.
         requirements: all requirements, including requirements that no test names. It is empty if
-            there is no list.
+            there is no list of requirements.
     """
 
     title: str = "Bench report"
@@ -236,7 +240,7 @@ class BenchReport:
 
 
 def merge_reports(reports: Sequence[BenchReport], title: str = "") -> BenchReport:
-    """Merge several reports, such as reports of workers of a run, or of runs in three modes.
+    """Merge several bench reports, such as those of parallel workers, or of runs in three modes.
 
     Equal runs are merged into one, and so are equal requirements. Tests keep the order of the
     reports.
@@ -269,10 +273,11 @@ _GROUP: Final = 4
 
 
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
-    """Return at most `most` samples: the first, the last, and two extremes of every four samples.
+    """Return a curve with at most `most` samples, which keeps the extremes of the curve.
 
-    If one of the four samples is a word, only the first and the last sample are kept. The step is
-    repeated while there are too many samples.
+    The first and the last sample stay. Of every four samples, the two extremes stay. If one of the
+    four is a word, the first and the last of them stay. This is repeated while there are too many
+    samples.
 
     Args:
         points: samples in order of time.

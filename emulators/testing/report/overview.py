@@ -34,11 +34,11 @@ _NO_ANCHOR: Final = re.compile(r"[\W_]+")
 
 @dataclass(frozen=True, slots=True)
 class ReportedTest:
-    """A test and its place on the page.
+    """A test as the page of a bench report lists it.
 
     Attributes:
         record: record of the test.
-        anchor: link target on the page, which is equal in each report with these tests.
+        anchor: link target on the page, which is the same in each report with these tests.
         file: part of the node ID before the name of the test.
         name: rest of the node ID.
     """
@@ -50,7 +50,7 @@ class ReportedTest:
 
 
 class OverallVerdict(StrEnum):
-    """Verdict of all tests of a requirement.
+    """Verdict about a requirement, from the outcomes of all tests that name it.
 
     Attributes:
         FAILED: at least one test failed or could not be completed.
@@ -157,7 +157,7 @@ _COMMENT: Final = "#"
 
 
 def read_requirements(path: Path) -> tuple[Requirement, ...]:
-    """Read a file of requirements.
+    """Read the file with the list of requirements for a bench report.
 
     Raises:
         OSError: the file cannot be read.
@@ -170,7 +170,7 @@ def read_requirements(path: Path) -> tuple[Requirement, ...]:
 
 
 def parse_requirements(text: str, file: str) -> tuple[Requirement, ...]:
-    """Return the requirements of a text.
+    """Parse the list of requirements for a bench report.
 
     Args:
         text: text with a requirement per line: the name, as in the marker `req`, then blanks, then

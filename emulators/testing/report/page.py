@@ -131,11 +131,12 @@ class _TestOnPage:
 
 
 def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
-    """Return the HTML page of a report.
+    """Return the HTML page of a bench report.
 
     Args:
         report: the report to show.
-        room_bytes: space for the data of tests, in bytes. The page lists the data that do not fit.
+        room_bytes: largest size of the data of tests on the page, in bytes. The page lists the data
+            that do not fit.
     """
     places = overview.reported(report.tests)
     unwell = [place for place in places if place.record.outcome in overview.UNWELL]
@@ -166,7 +167,7 @@ _PATH_POINTS: Final = 4_000
 
 @dataclass(frozen=True, slots=True)
 class PagePath:
-    """A path: one signal drawn over another.
+    """A diagram on the page of a run, in which one signal is drawn over another.
 
     Attributes:
         x: name and unit of the signal on the x axis.
@@ -192,7 +193,10 @@ class PagePath:
 
     @property
     def drawn(self) -> tuple[float, float, str]:
-        """Width and height of the picture, and the drawn path; equal units have the same scale."""
+        """Width and height of the diagram, and its curve as an SVG path.
+
+        If both signals have the same unit, both axes have the same scale.
+        """
         (left, right), (low, high) = (widened(min(c), max(c)) for c in self._columns)
         x_scale, y_scale = _PATH_SIZE / (right - left), _PATH_SIZE / (high - low)
         if self.x[1] == self.y[1]:
@@ -210,13 +214,13 @@ def run_page(
     wires: Sequence[Sequence[str]],
     paths: Sequence[PagePath] = (),
 ) -> str:
-    """Return the HTML page of one run.
+    """Return the HTML page about one run of a bench.
 
     Args:
         record: the run. Its `nodeid` is the title, and its `reason` is the result.
         run: environment and settings of the run.
         wires: name, place, rate and devices of each wire.
-        paths: pairs of signals, one drawn over the other.
+        paths: diagrams in which one signal is drawn over another.
     """
     (place,) = overview.reported([record])
     (shown,) = _on_page([place], _PAGE_BYTES)

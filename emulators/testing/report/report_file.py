@@ -53,7 +53,7 @@ _NAMES: Final[Mapping[type, str]] = {
 
 
 class ReportError(ValueError):
-    """JSON that is not a report of this version; the message has the place and the error."""
+    """Raised if JSON is not a bench report of this version; the message has place and error."""
 
 
 def to_data(value: Any) -> Any:  # what a value holds is open
@@ -62,7 +62,7 @@ def to_data(value: Any) -> Any:  # what a value holds is open
 
 
 def from_data(kind: type[_T], data: object) -> _T:
-    """Return the report value from the result of `to_data`.
+    """Convert the result of `to_data` back to the value of a bench report.
 
     Args:
         kind: type of the value: `BenchReport`, `TestRecord`, ...
@@ -91,7 +91,7 @@ def _values(value: Any) -> dict[str, Any]:
 
 
 def from_json(text: str) -> BenchReport:
-    """Read a report from its JSON text.
+    """Return a bench report from its JSON text.
 
     Raises:
         ReportError: the text is not JSON, not a report, a report of another version, or has an
@@ -148,7 +148,10 @@ class _Scanner:
         self._at += 1
 
     def value(self) -> Any:
-        """Return the next value, and move behind it; raise ValueError if there is no value."""
+        """Return the next JSON value of the file; raise ValueError if there is none.
+
+        The next call continues behind this value.
+        """
         while True:
             try:
                 found, end = self._scan(self._text, self._at)
@@ -376,7 +379,10 @@ _JSON: Final = ".json"
 
 
 def check_report(path: Path) -> None:
-    """Check before a run that its report can be written after it.
+    """Check before a test run that its report can be written at the end.
+
+    Args:
+        path: path of the report.
 
     Raises:
         ValueError: Jinja2 or the folder is missing, or the folder is not writable, or the path is a
@@ -390,7 +396,7 @@ def check_report(path: Path) -> None:
 
 
 def write_report(report: BenchReport, path: Path) -> None:
-    """Write the page of a report; if the name ends in `.json`, write JSON as `write_run` does.
+    """Write a bench report as an HTML page, or as JSON if the name of the file ends in `.json`.
 
     An existing file is replaced only after the new file is complete.
 
@@ -405,7 +411,9 @@ def write_report(report: BenchReport, path: Path) -> None:
 
 
 def write_run(report: BenchReport, path: Path) -> None:
-    """Write a report as JSON atomically.
+    """Write a bench report as JSON.
+
+    An existing file is replaced only after the new file is complete.
 
     Raises:
         OSError: the file cannot be written. The `filename` of the exception is `path`.
@@ -414,11 +422,11 @@ def write_run(report: BenchReport, path: Path) -> None:
 
 
 def read_run(path: Path) -> BenchReport:
-    """Read a report that `write_run` wrote.
+    """Read a bench report from a JSON file that `write_run` has written.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: the file is not a report. The message has the place and the error.
+        ValueError: the file is not a report. The message has the place of the error.
     """
     try:
         with path.open(encoding="utf-8") as file:

@@ -21,10 +21,10 @@ _WIDE: Final = 25
 
 
 class TimeAxis(NamedTuple):
-    """The span of time that a report displays.
+    """The span of time on the horizontal axis of a bench report's diagrams.
 
     Attributes:
-        from_us: beginning of the span.
+        from_us: beginning of the span, in microseconds.
         to_us: end of the span, which is later than its beginning.
     """
 
@@ -32,7 +32,10 @@ class TimeAxis(NamedTuple):
     to_us: int
 
     def part(self, at_us: int) -> float:
-        """Return the place of a time, in per cent from the left; a time outside is at the edge."""
+        """Return the position of a time on the axis, in per cent from the left.
+
+        A time outside the axis is at its left or right end.
+        """
         part = (at_us - self.from_us) * 100 / (self.to_us - self.from_us)
         return round(min(max(part, 0), 100), 2)
 
@@ -44,12 +47,12 @@ class TimeAxis(NamedTuple):
 
 
 class TimeSpan(NamedTuple):
-    """A fault, or a value of a signal, drawn as a span on a time axis.
+    """A bar on the time axis of a bench report: a fault, or a value of a signal.
 
     Attributes:
-        left: place of the beginning, in per cent.
-        width: width of the event, in per cent.
-        text: description of the event.
+        left: position of the left end, in per cent of the axis.
+        width: width of the bar, in per cent of the axis.
+        text: text of the bar.
     """
 
     left: float
@@ -80,16 +83,16 @@ _SWITCH: Final[tuple[float, float]] = (0, 1)
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """The curve or the words of one signal on a time axis.
+    """One signal in the timeline of a bench report: a curve of numbers, or a row of words.
 
     Attributes:
         name: name of the signal.
         unit: unit of the numbers.
-        path: curve of the signal, or empty for words.
+        path: curve of the signal as an SVG path, or empty for words.
         words: values of the signal if they are words, or its only number.
         low: least number.
         high: greatest number.
-        scale: numbers at the lower and the upper edge of the field.
+        scale: numbers at the lower and the upper edge of the diagram.
         zero: distance of zero from the top, in per cent, or None if zero is at an edge or outside.
         rows: values for a table: first, least, greatest and last value, and number of samples.
     """
@@ -216,14 +219,14 @@ class _TimelineEvent(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """The faults, events and signals of a test on a time axis.
+    """Timeline of a test in a bench report: faults, events and signals on a common time axis.
 
     Attributes:
         axis: the displayed span of time.
         faults: the faults that occurred.
         events: actions, and missed expectations.
         lanes: the signals.
-        left_out: description of the signals and events that are not drawn.
+        left_out: numbers of faults and signals that are not drawn, as text.
     """
 
     axis: TimeAxis
@@ -241,7 +244,7 @@ class Timeline:
 
 
 def timeline_of(test: bench_report.TestRecord) -> Timeline | None:
-    """Return the time line of a test, or None if there is nothing on it."""
+    """Return the timeline of a test, or None if the test has neither signals nor faults."""
     if not (test.series or test.faults):
         return None
     axis = _axis_of(test)

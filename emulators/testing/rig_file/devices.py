@@ -56,7 +56,7 @@ _Wires = dict[str, plan.WirePlan | None]
 
 
 class DeviceReader:
-    """Reads the devices of a rig file and puts them on wires.
+    """Reads the tables `[device]` of a rig file: which devices there are, and on which wires.
 
     Args:
         section: table `[device]`, or None if the file has no such table.
@@ -65,7 +65,7 @@ class DeviceReader:
         folder: folder that relative paths start from.
 
     Attributes:
-        plans: devices by name. The value is None for a device of unknown type.
+        plans: descriptions of the devices by name. The value is None for a device of unknown type.
         sections: tables of the devices by name.
     """
 
@@ -190,13 +190,16 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits | None:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return which kind of device a `type` names, and the type with a path that can be opened.
+    """Return what the key `type` of a device names: built-in type, EDS, model or Python code.
 
     Args:
-        text: type as in the file.
+        text: type as in the rig file.
         folder: folder in which files are searched.
         types: function that returns the names of all device types. It is called if the type is not
             built in.
+
+    Returns:
+        The kind of the type, and the type with a path that can be opened.
 
     Raises:
         ValueError: no such type or file exists.
@@ -288,6 +291,8 @@ _TOLERANCE_TABLE = "tolerance"
 
 class DoorReader:
     """Reads the tables `[real]` and `[hardware]` of a rig file.
+
+    They have the addresses for hosts in real time, and those of real devices.
 
     Args:
         wires: wires by name. The value is None for a wire of unknown type.

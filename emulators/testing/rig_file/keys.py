@@ -32,7 +32,7 @@ _FRAMING: Final = re.compile(r"[5-8][NEOMS](1|1\.5|2)")
 
 
 def check_name(name: str) -> None:
-    """Raise ValueError unless a text can be the name of a device, wire or signal."""
+    """Raise ValueError if a text cannot be the name of a device, wire or signal in a rig file."""
     if len(name) > _LONGEST_NAME:
         raise ValueError(f"a name of {len(name)} letters; {_LONGEST_NAME} are enough")
     if not _NAME.fullmatch(name):

@@ -88,13 +88,14 @@ class DeviceKind(Enum):
 
 
 class MadeDevice:
-    """The device that a reader has made to check the file; the first bench uses it.
+    """Keeps the device that was made in order to check a rig file, for use by the first bench.
 
     A copy of this object, in this process or in another process, does not contain the device.
 
     Args:
         device: a device made by `configure`, or a slave.
-        of: parameters of the device. A bench with other parameters does not use the device.
+        of: parameters with which the device was made. A bench with other parameters does not use
+            it.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:
@@ -158,7 +159,7 @@ class DevicePlan:
 
 @dataclass(frozen=True, slots=True)
 class FaultPlan:
-    """A fault that a rig file schedules.
+    """A fault that a rig file schedules, as read from the file.
 
     Attributes:
         owner: name of the device or wire that has the fault.
@@ -171,7 +172,7 @@ class FaultPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BusPlan:
-    """A python-can bus, as described in a rig file.
+    """Settings of a python-can bus, as read from a rig file.
 
     Attributes:
         interface: name of the driver.
@@ -188,12 +189,12 @@ class BusPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoorPlan:
-    """Where hosts find a wire in real time.
+    """Addresses at which hosts find a wire in real time, as read from a rig file.
 
     Attributes:
-        link: symbolic link to the pty of a line, or None for no link.
-        serve: additional URLs of a line: `rfc2217://`, `socket://`.
-        bus: outside bus that a CAN bus is connected with.
+        link: symbolic link to the pty of a serial line, or None for no link.
+        serve: additional URLs of a serial line: `rfc2217://`, `socket://`.
+        bus: python-can bus that is connected with an emulated CAN bus.
     """
 
     link: Path | None = None
@@ -203,11 +204,11 @@ class DoorPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealPlan:
-    """The settings of a rig file for real time.
+    """The table `[real]` of a rig file: settings for a bench in real time.
 
     Attributes:
         control: path of the control socket to serve.
-        doors: connections for hosts by name of the wire. A wire without an entry has a pty.
+        doors: addresses for hosts, by name of the wire. A serial line without an entry has a pty.
     """
 
     control: Path | None = None
@@ -216,7 +217,7 @@ class RealPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortPlan:
-    """The port of a line on real hardware.
+    """The port at which real devices on a serial line are connected, as read from a rig file.
 
     Attributes:
         port: device path, or URL of pyserial.
@@ -229,7 +230,9 @@ class PortPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerPlan:
-    """Commands that switch a device; without a command the operator switches it.
+    """Commands that switch the supply of a real device, as read from a rig file.
+
+    Without such commands the operator switches the device.
 
     Attributes:
         on: command line that switches the device on, as a list of words. No shell is used.
@@ -242,7 +245,7 @@ class PowerPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """Permitted deviations of an operator and a real device.
+    """Permitted deviations in tests with real devices and a human operator.
 
     Attributes:
         stick_pct: deviation of a stick held by hand, in per cent.

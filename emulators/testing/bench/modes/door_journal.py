@@ -173,7 +173,14 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Mark frames as already recorded at all other connections of a bus, or unmark them."""
+        """Note that frames are recorded, so that other connections of the bus do not record them.
+
+        Args:
+            wire: name of the bus.
+            watch: monitor of the connection that has recorded the frames.
+            frames: the recorded frames.
+            by: 1 to note the frames, or -1 to withdraw the note.
+        """
         with self._lock:
             self._announce(wire, watch, frames, by)
 

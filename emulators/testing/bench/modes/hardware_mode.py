@@ -56,11 +56,11 @@ _POLL_US: Final = 5_000
 
 
 class HardwareMode(BenchMode):
-    """A `BenchMode` of real devices, which the rig file describes.
+    """Mode of a bench whose devices are real, as described in the rig file.
 
-    A device is at a port or on a bus. Its operator is a human at the terminal, or the control
-    socket of an emulator in place of the device. Conditions are checked on all traffic, and while
-    the bench waits.
+    Each device is at a port or on a bus. Its operator is a human at the terminal. An emulator may
+    stand in for a device. Its operator is then the control socket of the emulator. Conditions are
+    checked on all traffic, and while the bench waits.
 
     Args:
         plan: content of a rig file with the section `[hardware]`.
@@ -68,7 +68,7 @@ class HardwareMode(BenchMode):
 
     Raises:
         ValueError: the plan has no addresses of the devices, or names an unknown device.
-        PortGone: an emulator is missing.
+        PortGone: an emulator that stands in for a device is missing.
     """
 
     name = "hardware"
@@ -140,7 +140,11 @@ class HardwareMode(BenchMode):
         self._operators.switch_power(owner, on=on)
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Ask the human at a device for an observation, or check the condition with an emulator."""
+        """Return whether something is observed at a real device.
+
+        A human answers. If there is no human at the device, the condition `seen` is checked
+        instead.
+        """
         answer = self._operators.sees(owner, text)
         return super().observe(owner, text, seen, within_us) if answer is None else answer
 
@@ -174,7 +178,11 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Return why a failed test is not valid, or "" if it is valid or a human answered no."""
+        """Return why a failed test has no valid verdict, or "" if it has.
+
+        A verdict is not valid if the host or an emulator was too late. It is always valid if a
+        human has answered no.
+        """
         if self._operators.said_no:
             return ""
         host_us = max(self._pace.late_us, self._waits.worst_us)

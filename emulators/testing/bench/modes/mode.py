@@ -39,7 +39,14 @@ class _HostDoors(Protocol):
     """
 
     def link(self, wire: str) -> Link[Any]:
-        """Connect a host; the link carries bytes on a serial line, or frames on a bus."""
+        """Connect a host with a wire.
+
+        Args:
+            wire: name of the wire.
+
+        Returns:
+            The link. It carries bytes on a serial line, or frames on a CAN bus.
+        """
         ...
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
@@ -63,18 +70,18 @@ class _HostDoors(Protocol):
 
 
 class BenchMode(ABC):
-    """A mode defines where the devices are and how time passes.
+    """Base class of the modes of a bench: where its devices are, and how its time passes.
 
-    Unsupported operations raise `NotOnThisBench`.
+    Operations that a mode does not support raise `NotOnThisBench`.
 
     Args:
         rig: rig with the devices. For real devices, the rig has equivalent devices and does not
             run.
-        tolerance: the tolerances.
+        tolerance: permitted deviations of operators and real devices.
 
     Attributes:
         name: name of the mode: `virtual`, `real` or `hardware`.
-        tolerance: the tolerances.
+        tolerance: permitted deviations of operators and real devices.
         doors: connections for hosts. The first connection starts the time.
     """
 
@@ -119,7 +126,15 @@ class BenchMode(ABC):
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
-        """Start or schedule a fault of a device or wire, or of any if `owner` is empty."""
+        """Start or schedule a fault.
+
+        Args:
+            owner: name of the device or wire with the fault, or empty if the fault may belong to
+                any.
+            spec: the fault with its arguments and its time.
+            condition: condition that starts the fault, or None.
+            for_us: duration of the fault in microseconds, or None if it stays.
+        """
 
     @property
     def orders(self) -> Sequence[FaultOrder]:
@@ -127,11 +142,21 @@ class BenchMode(ABC):
         return self._rig.orders
 
     def check_fault(self, owner: str, name: str) -> None:
-        """Raise ValueError unless a device or wire, or any if `owner` is empty, has the fault."""
+        """Raise ValueError if a fault does not exist.
+
+        Args:
+            owner: name of the device or wire with the fault, or empty if the fault may belong to
+                any.
+            name: name of the fault.
+        """
         self._query(lambda rig: rig.state.full_fault_name(owner, name))
 
     def describe(self, owner: str) -> BenchDescription:
-        """Return inputs, outputs and faults of a device, or of all devices if `owner` is empty."""
+        """Return the inputs, outputs and faults of a device.
+
+        Args:
+            owner: name of the device, or empty for all devices of the bench.
+        """
         return self._query(lambda rig: rig.describe(owner))
 
     @abstractmethod
@@ -151,7 +176,13 @@ class BenchMode(ABC):
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Run an action at a device: call `do`, or show the text to a human who does it."""
+        """Run an action at a device, or ask a human to do it.
+
+        Args:
+            owner: name of the device, or empty for all devices.
+            text: description of the action, which a human reads.
+            do: function that executes the action with an emulator.
+        """
         do()
 
     def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
@@ -168,12 +199,15 @@ class BenchMode(ABC):
     def await_until(
         self, done: Callable[[], bool], within_us: int, where: Callable[[], str]
     ) -> bool:
-        """Advance the time as `wait_until` does, for an async body.
+        """Advance the time until a condition is true, for a test that is a coroutine.
 
         Args:
-            done: the condition.
-            within_us: longest wait.
-            where: returns the line of the body that waits.
+            done: function that returns whether the condition is true.
+            within_us: longest wait in microseconds.
+            where: function that returns file and line of the coroutine's wait, for messages.
+
+        Returns:
+            True if the condition is true, or False after the time-out.
         """
         return self.wait_until(done, within_us)
 
@@ -195,10 +229,10 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return why a failed test is not valid, or "" if real time was kept."""
+        """Return why a failed test has no valid verdict, or "" if real time was kept."""
 
     def hung(self) -> str:
-        """Return the error of a host that has waited endlessly; empty if there was none."""
+        """Return the error message of a host that has waited endlessly, or "" if none has."""
         return ""
 
     @abstractmethod

@@ -47,7 +47,7 @@ class _PowerSwitch:
         self._device, self._plan = device, plan
 
     def switch(self, *, on: bool) -> None:
-        """Switch the supply.
+        """Switch the supply of a device on or off, by the command in the rig file.
 
         Raises:
             BenchBlocked: the command cannot be run, has failed, or did not end.
@@ -86,14 +86,15 @@ _DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 class Terminal:
     """Asks a human at the terminal, even if standard input and output are redirected.
 
-    pytest may therefore capture both. Hosts keep running while the terminal waits for an answer.
+    So it works although pytest captures both. Hosts keep running while the terminal waits for an
+    answer.
 
     Args:
-        path: path of the terminal.
+        path: path of the terminal device.
 
     Attributes:
-        hosts: functions that are called in turn, with a duration in microseconds, during the wait
-            for an answer.
+        hosts: functions of hosts that are called in turn, with a duration in microseconds, during
+            the wait for an answer.
     """
 
     def __init__(self, path: str = _TERMINAL) -> None:
@@ -101,7 +102,7 @@ class Terminal:
         self.hosts: list[Callable[[int], object]] = []
 
     def prompt(self, text: str) -> str:
-        """Show a text and return the line that is typed.
+        """Show a text at the terminal, and return the line that the human types.
 
         Raises:
             OperatorRefused: there is no terminal.
@@ -120,10 +121,10 @@ class Terminal:
         return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
-        """Ask the human to do an action, and wait for the answer.
+        """Ask the human to do an action at the device, and wait for the confirmation.
 
         Args:
-            text: the action, as a sentence without its end.
+            text: the action, as a sentence without its full stop.
 
         Raises:
             OperatorRefused: the human did not do the action.
@@ -208,7 +209,10 @@ class _HumanOperator:
             self._record.set(name, value)
 
     def get(self, name: str) -> Setting:
-        """Return the set value of an input, or ask for the value of an output."""
+        """Return the value of an input or output of a real device.
+
+        For an input it is the value that was last set. For an output the human is asked.
+        """
         if name in self._physical.inputs.table:
             return self._physical.inputs[name]
         output = self._physical.outputs.get(name)
@@ -231,7 +235,10 @@ class _HumanOperator:
         self.have_done(f"press the {text}{held} and let it go")
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Ask to make a physical fault; raise NotOnThisBench for a wire fault or a given time."""
+        """Ask the human to make a physical fault at the device.
+
+        Raises NotOnThisBench for a fault of the wire, or for a fault at a given time.
+        """
         item = self._find_fault(spec.name)
         if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
             raise errors.NotOnThisBench(f"no hand makes {spec.name} at a certain time")
@@ -339,10 +346,13 @@ class _EmulatorOperator:
         return late_us
 
     def prepare(self, like: HasSignals) -> None:
-        """Reset the device: clear all faults, and set all inputs to their initial values.
+        """Prepare the device for a test: clear all faults, and reset all inputs.
 
-        The power of the device is then off. Its physical state stays: the position of a drive is
-        unchanged.
+        The inputs get their initial values. The power of the device is then off. Its physical state
+        stays, such as the position of a drive.
+
+        Args:
+            like: equivalent emulated device, which has the initial values.
         """
         for name in self._wire_faults:
             self._request("clear", name=name)
@@ -478,17 +488,18 @@ _DeviceOperator = _HumanOperator | _EmulatorOperator
 
 
 class Operators:
-    """The operators of all devices of a bench.
+    """The operators of all real devices of a bench: humans, or control sockets of emulators.
 
     Args:
         plan: content of the rig file.
         where: section of the rig file for real devices.
-        like: equivalent emulated devices, for their tables. These devices do not run.
+        like: equivalent emulated devices, for the names of inputs, outputs and faults. These
+            devices do not run.
         terminal: terminal of the human.
         journal: journal that records the actions.
 
     Raises:
-        PortGone: an emulator in place of a device is missing.
+        PortGone: an emulator that stands in for a device is missing.
     """
 
     def __init__(
@@ -566,12 +577,13 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return a function that starts a fault, called with the time of the bench.
+        """Return a function that starts a fault when it is called with the time of the bench.
 
         Args:
-            owner: name of the device or wire, or empty for any.
-            order: the fault, whose name is replaced by its full name. If it has a condition, the
-                operator must be an emulator, because a human is too slow.
+            owner: name of the device or wire with the fault, or empty if the fault may belong to
+                any.
+            order: requested fault, whose name is replaced by its full name. If the fault has a
+                condition, the operator must be an emulator, because a human is too slow.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -610,7 +622,13 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Return the answer of the human at a device, or of the first human; None without any."""
+        """Ask a human whether something is observed; return the answer, or None without a human.
+
+        Args:
+            owner: name of the device whose operator is asked, or empty for the first device with a
+                human.
+            text: description of the observation.
+        """
         for device in [owner] if owner else self._plan.devices:
             answer = self._operator_at(device).sees(text)
             if answer is not None:
@@ -619,7 +637,13 @@ class Operators:
         return None
 
     def have_done(self, owner: str, text: str) -> bool:
-        """Ask the human at a device, or the first human, for an action; False without a human."""
+        """Ask a human to do an action; return False if there is no human.
+
+        Args:
+            owner: name of the device whose operator is asked, or empty for the first device with a
+                human.
+            text: description of the action.
+        """
         for device in [owner] if owner else self._plan.devices:
             if self._operator_at(device).have_done(text):
                 self._journal.note(device, f"done: {text}")

@@ -80,18 +80,19 @@ class _RigThread:
         return do()
 
     def wait_until(self, done: Callable[[], bool], until_us: int) -> bool:
-        """Wait until a condition is true, checked after each step.
+        """Wait in real time until a condition is true, which is checked after each step of the rig.
 
         Args:
             done: function that is called in the thread of the rig. An exception of the function is
                 raised in the thread of the caller.
-            until_us: time of the rig. The first step at or after this time is the last step.
+            until_us: time of the rig in microseconds. The first step at or after this time is the
+                last step.
 
         Returns:
             True if the condition is true, or False after the time-out.
 
         Raises:
-            BenchError: the time is stopped, or the caller is in the thread of the rig.
+            BenchError: the bench is closed, or the caller is in the thread of the rig.
         """
         if self.here:
             raise BenchError("what is asked between two ticks cannot wait: no time passes there")
@@ -249,11 +250,13 @@ class _Watch(HostPace):
 
 
 class RealMode(EmulatedMode):
-    """A `BenchMode` in real time; it starts with the first connection or wait.
+    """Mode of a bench of emulated devices in real time.
+
+    The time starts with the first connection of a host or the first wait.
 
     Args:
-        rig: the rig, with the clock and the bridges of `outside`.
-        outside: addresses of the wires for hosts, which are closed at the end.
+        rig: rig with the devices, and with the clock and the bridges of `outside`.
+        outside: connections at which hosts find the wires. They are closed at the end.
     """
 
     name = "real"
@@ -275,12 +278,12 @@ class RealMode(EmulatedMode):
     def open(
         cls, mounts: Sequence[Mount], plan: RealPlan, rig_at: Callable[[OutsideEnds], BenchRig]
     ) -> Self:
-        """Return the mode of devices on their wires.
+        """Open the connections for hosts, and return the mode of the bench in real time.
 
         Args:
             mounts: the wires with their devices.
-            plan: addresses for hosts.
-            rig_at: function that makes the rig, with the clock and the bridges of the outside.
+            plan: settings of the rig file for real time.
+            rig_at: function that makes the rig, with the clock and the bridges of the connections.
 
         Raises:
             PortGone: a bus cannot be opened.
@@ -319,10 +322,14 @@ class RealMode(EmulatedMode):
         self.wait_until(lambda: False, duration_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Wait until a condition is true; return False after the time-out.
+        """Wait in real time until a condition is true; return False after the time-out.
 
         The condition is checked between the ticks. If the condition itself receives from a device,
         it is called in the thread of the caller instead, once per tick.
+
+        Args:
+            done: function that returns whether the condition is true.
+            within_us: longest wait in microseconds.
         """
         if self._judging and self._thread.here:
             raise HostInCondition
@@ -365,7 +372,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return why a failed test is not valid, or "" if real time was kept."""
+        """Return why a failed test has no valid verdict, or "" if real time was kept."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us

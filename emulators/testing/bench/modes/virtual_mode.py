@@ -110,11 +110,12 @@ class _WaitLimit(HostLimit):
         self.due_us = now_us + self._first_us if self.limit_us < NEVER else NEVER
 
     def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
-        """Count a wait as one part of the limit.
+        """Count a wait of a host towards the limit.
 
         Args:
-            now_us: the present time.
-            where: function that returns the line that waits. The default is the line of the host.
+            now_us: present time in microseconds.
+            where: function that returns file and line of the wait. The default is the line of the
+                host.
 
         Raises:
             HostHangsError: the limit is reached.
@@ -131,7 +132,7 @@ class _WaitLimit(HostLimit):
     def look(
         self, now_us: int, what: str = "read the clock", where: Callable[[], str] | None = None
     ) -> None:
-        """Count a read of the clock, or a wait that has taken no time.
+        """Count a read of the clock by a host, or a wait that took no time.
 
         Raises:
             HostHangsError: there were too many such reads and waits.
@@ -142,10 +143,10 @@ class _WaitLimit(HostLimit):
             self._refuse(now_us, f"has {what} {_MOST_LOOKS} times", where)
 
     def count_request(self, now_us: int) -> None:
-        """Count a request of the test, such as `get`.
+        """Count a request of the test to the bench, such as `get`.
 
         Raises:
-            HostHangsError: there were too many requests at one instant.
+            HostHangsError: there were too many requests at one instant of virtual time.
         """
         if now_us != self._request_us:
             self._requests, self._request_us = 0, now_us
@@ -167,12 +168,13 @@ class _WaitLimit(HostLimit):
 
 
 class RigPassing:
-    """Advances the virtual time of a rig while a host waits, as a `Passing`.
+    """Advances the virtual time of a rig while a host waits in functions such as `time.sleep`.
 
-    Callbacks in the middle of a step may read the clock, but not wait.
+    It is a `Passing`. Functions that are called back in the middle of a step may read the clock,
+    but not wait.
 
     Args:
-        rig: rig that is advanced while a caller waits.
+        rig: rig that is advanced while a host waits.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -184,9 +186,12 @@ class RigPassing:
         return EPOCH_S + self._rig.now_us / 1e6
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Advance the time until `done()` is true; return False after the timeout.
+        """Advance the virtual time until `done()` is true; return False after the timeout.
 
-        Without a timeout, the method returns False when there are no more events, or after an hour.
+        Args:
+            done: function that returns whether the wait is over.
+            timeout_s: longest wait in seconds. With None the wait ends when there are no more
+                events, or after an hour.
 
         Raises:
             HostTimeError: the rig has called the method in the middle of a step.
@@ -323,12 +328,12 @@ _EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
 
 class VirtualMode(EmulatedMode):
-    """A `BenchMode` in the virtual time of its rig, which waits advance.
+    """Mode of a bench of emulated devices in virtual time, which advances while the test waits.
 
     Args:
         rig: rig with the devices.
-        limit_us: longest time that hosts may wait until the test advances the time itself; `NEVER`
-            for no limit.
+        limit_us: longest time in microseconds for which hosts may wait before the test itself
+            advances the time, or `NEVER` for no limit.
     """
 
     name = "virtual"
@@ -360,11 +365,11 @@ class VirtualMode(EmulatedMode):
         self._limit.restart(self._rig.rig.now_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Advance the time until a condition is true; return False after the time-out.
+        """Advance the virtual time until a condition is true; return False after the time-out.
 
-        Without a limit, the wait ends when there are no more events, or after a day. The condition
-        is checked after each step. In long steps it is also checked periodically, because it may
-        poll a host that has work to do.
+        Without a time-out, the wait ends when there are no more events, or after a day. The
+        condition is checked after each step. In long steps it is also checked periodically, because
+        it may poll a host that has work to do.
         """
         found = self._wait_until(done, within_us)
         self._limit.restart(self._rig.rig.now_us)
