@@ -46,20 +46,20 @@ _StartSystem = Callable[[NodeManager, ExitStack], None]
 
 
 class Board:
-    """A board that boots, runs its system, and loses it with its supply; an item of a `Schedule`.
+    """An emulated board: it boots and runs RT components, until a power cut or a reset ends them.
 
     A power cut is not a shutdown: no component is deactivated, no device is notified, and all
-    caches are lost. The next boot makes the whole system again. The reset button has the same
-    effect.
+    caches are lost. The next boot makes all components again. The reset button has the same effect.
+    A board is an item of a `Schedule`.
 
     Args:
-        limits: limits of the node.
-        start: function that makes the system of the node.
-        lines: lines that are cut together with the supply.
+        limits: limits of the board.
+        start: function that makes the RT components of the board.
+        lines: lines to devices, which are cut together with the supply.
 
     Attributes:
-        inputs: inputs of the board.
-        manager: system of the board while it runs, or None.
+        inputs: inputs of the board: the reset button and the power cut.
+        manager: manager of the RT components while they run, or None.
         boots: number of boots.
     """
 

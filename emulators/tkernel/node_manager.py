@@ -27,13 +27,14 @@ from tickrig.wire.rtc_types.cdr import encode
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeLimits:
-    """The limits of a node.
+    """The limits of an emulated board that runs RT components.
 
     Attributes:
         connectors: largest number of connectors for all ports together, 1..1000.
-        message_octets: largest size of a value as CDR, 16..1048576.
-        tick_us: period of the cyclic handlers, 1000..1000000. All periods are multiples of it.
-        boot_us: time from power-up until the node answers, 0..600000000.
+        message_octets: largest size of a value as CDR, in bytes, 16..1048576.
+        tick_us: period of the cyclic handlers in microseconds, 1000..1000000. All periods are
+            multiples of it.
+        boot_us: time from power-up until the board answers, in microseconds, 0..600000000.
 
     Raises:
         ValueError: a limit is out of range.
@@ -135,10 +136,10 @@ class NodeManager(Manager):
     def add(
         self, component: R, rate_hz: float = _RATE_HZ, context: ExecutionContext | None = None
     ) -> R:
-        """Add a component within the limits; see `Manager.add`.
+        """Add an RT component to the board if the board's limits allow it; see `Manager.add`.
 
         Raises:
-            RtcRefused: the period of the component is not a multiple of the node's tick, or
+            RtcRefused: the period of the component is not a multiple of the board's tick, or
                 `Manager.add` refuses the component.
         """
         name = component.instance_name
@@ -248,12 +249,14 @@ class _Closable(Protocol):
 
 
 class BoardLines:
-    """The lines and sources that components of a board open. All of them can be cut.
+    """Opens lines to devices for the RT components of an emulated board, and cuts all of them.
+
+    They are cut when the board loses its supply.
 
     Args:
         open_urg: function that opens the line of a range finder.
         open_reader: function that opens the line of a ucode reader.
-        open_source: function that makes the client of the resolution service.
+        open_source: function that makes the client of the ucode resolution service.
     """
 
     def __init__(
@@ -294,10 +297,12 @@ def add_range_finder(manager: NodeManager, lines: BoardLines, device: str) -> No
 def add_position_detection(
     manager: NodeManager, lines: BoardLines, device: str, service: str = ""
 ) -> None:
-    """Add, connect and activate the components of reader, settlement and interpretation.
+    """Add the RT components for position detection by ucodes to a board, connect and activate them.
+
+    The components are reader, settlement and interpretation.
 
     Args:
-        manager: the manager of the node.
+        manager: the manager of the board's RT components.
         lines: object that opens the lines of the components.
         device: name of the reader's line.
         service: address of the resolution service. The default is the address in the component.

@@ -10,7 +10,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 
 
 class Operated:
-    """An object without a wire, with an operator who acts on it now or later.
+    """An emulated object without a wire whose inputs an operator sets, now or at a later time.
 
     `EmulatorControl` answers requests about it.
 
@@ -22,7 +22,7 @@ class Operated:
 
     Attributes:
         operator: operator that executes the actions.
-        now_us: present time, from `tick`.
+        now_us: time of the latest `tick`, in microseconds.
     """
 
     def __init__(

@@ -41,7 +41,9 @@ class _Response:
 
 
 class ResolutionService:
-    """Answers `/ucodes/UCODE` with an address, and `/contents/NAME` with JSON, without any I/O.
+    """An emulated ucode resolution service, without any network I/O.
+
+    It answers requests for `/ucodes/UCODE` with an address, and for `/contents/NAME` with JSON.
 
     Args:
         table: ucodes and contents.
@@ -104,7 +106,7 @@ _TIMEOUT_US: Final = 1_000_000
 
 
 class SimSource:
-    """A `Source` for a service in the same process.
+    """Client of an emulated ucode resolution service in the same process; it is a `Source`.
 
     As with HTTP, requests are sent one after the other. A failed connection is reported at once.
 

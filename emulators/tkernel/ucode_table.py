@@ -26,11 +26,11 @@ EXAMPLE: Final = Path(__file__).with_name("example.toml").read_text("utf-8")
 
 @dataclass(frozen=True, slots=True)
 class UcodeTable:
-    """Ucodes and contents of a service.
+    """Table of a ucode resolution service: where the information of each ucode is.
 
     Attributes:
         ucodes: targets by ucode. The target is a name of `contents`, or an address.
-        contents: JSON texts by name.
+        contents: information as JSON texts, by name.
     """
 
     ucodes: Mapping[str, str] = field(default_factory=dict)
@@ -44,7 +44,7 @@ _SECTIONS: Final[Schema] = {
 
 
 def parse_table(text: str) -> UcodeTable:
-    """Read the text of a table of ucodes.
+    """Parse the TOML text of a table of ucodes for a resolution service.
 
     Raises:
         ValueError: the table is invalid. The message is one line.

@@ -35,9 +35,9 @@ class UnpatchedTimeError(HostTimeError):
 
 
 class HostHangsError(AssertionError):
-    """Raised if a host does not return, because it waits longer than its bench allows.
+    """Raised if a host does not return, because it waits longer than the bench allows.
 
-    In a search, the limit is set by the machine that the search runs.
+    In a search for failures, the limit is that of the `BenchMachine`.
     """
 
     __module__ = "tickrig"

@@ -68,7 +68,9 @@ class WirePlan:
 
     @property
     def frame_bits(self) -> int:
-        """Number of bits of a byte on a line, with the start bit; half a stop bit counts as one.
+        """Number of bits of one character on the line, including start, parity and stop bits.
+
+        Half a stop bit counts as a whole one.
 
         >>> WirePlan(name="line", framing="7E2").frame_bits
         11
@@ -147,7 +149,9 @@ class DevicePlan:
     made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
 
     def made_of(self, seed: int = 0) -> tuple[object, ...]:
-        """Return all parameters that determine the device when it is made.
+        """Return the parameters that determine the device when it is made.
+
+        A device that was made with equal parameters can be used for this description.
 
         Args:
             seed: seed of all random numbers, for a device on a serial line.
@@ -260,15 +264,15 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwarePlan:
-    """The ports and buses of the real devices, and their operators.
+    """The table `[hardware]` of a rig file: addresses of the real devices, and their operators.
 
     Attributes:
-        control: control sockets of emulators that replace the operator, by name of the device. The
-            operator of the other devices is at the terminal.
-        ports: ports of lines, by name of the wire.
-        buses: buses of CAN wires, by name of the wire.
-        power: commands that switch a device, by name of the device.
-        tolerance: the permitted deviations.
+        control: control sockets of emulators that stand in for devices, by name of the device. The
+            operator of the other devices is a human at the terminal.
+        ports: ports of serial lines, by name of the wire.
+        buses: python-can buses of CAN wires, by name of the wire.
+        power: commands that switch the supply of a device, by name of the device.
+        tolerance: permitted deviations in tests.
     """
 
     control: Mapping[str, Path] = field(default_factory=dict)
@@ -280,18 +284,18 @@ class HardwarePlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigPlan:
-    """The content of a rig file.
+    """The content of a rig file, which describes a bench.
 
     Attributes:
         seed: seed of all random numbers.
         wires: wires by name, including wires that the file omits.
         devices: devices by name, in the order of the file.
-        signals: signals by name, for formulas.
-        faults: faults in the order of the file.
-        safe: safe values of outputs at the end of a test, for each device.
-        body: body that drives move, or None if there is none.
+        signals: values that change with time, by name, for use in formulas.
+        faults: scheduled faults, in the order of the file.
+        safe: values that outputs must have at the end of a test, by device and output.
+        body: mechanical body that drives move, or None if there is none.
         real: settings for the bench in real time.
-        hardware: bench of real devices, or None if the file has no such section.
+        hardware: addresses of real devices, or None if the file has no such section.
         path: path of the file, for messages and relative paths, or None without a file.
     """
 
@@ -321,7 +325,10 @@ _WIRES: Final = {WireType.SERIAL: "serial line", WireType.RS485: "RS485", WireTy
 
 
 def summary(plan: RigPlan) -> Iterator[str]:
-    """Yield lines of text: the counts of all parts, then each wire with its devices and addresses.
+    """Yield a summary of a rig file as lines of text, as `tickrig check` prints it.
+
+    The first line has the number of devices, wires and other parts. Then each wire follows with its
+    devices and addresses.
 
     Args:
         plan: content of the rig file.
@@ -427,7 +434,7 @@ def seed_of(seed: int, name: str, *, alone: bool) -> int:
 
 
 class RigFileError(ValueError):
-    """Errors in a rig file; the message has one line per error.
+    """Raised if a rig file has errors; the message has one line per error.
 
     Attributes:
         file: name of the file.

@@ -32,15 +32,15 @@ from tickrig.host.text.values import Setting
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """The properties of a device, with which its table in a rig file is checked.
+    """Properties of a device with which its settings in a rig file are checked.
 
     Attributes:
         physical: inputs and outputs of the device.
         wire_faults: faults of the device's end of the wire, or of its bus.
         title: name of the device in messages.
         baud: baud rate of the type of a serial device.
-        node_id: node-ID of a node, from its DCF or model.
-        bit_rate: bit rate of a node, from its DCF.
+        node_id: node-ID of a CANopen node, from its DCF or model.
+        bit_rate: bit rate of a CANopen node, from its DCF.
         start: inputs whose initial values differ from the usual values.
         made: the device, for use by a bench.
     """
@@ -64,16 +64,16 @@ class Probe:
 
 @cache
 def eds_cache() -> late.EdsCache:
-    """Return the cache of the EDS files that this process has read, for all benches."""
+    """Return the cache of EDS files that all benches of this process share."""
     return late.EdsCache()
 
 
 class WrongDevice(NamedTuple):
-    """The reason why a device cannot be made.
+    """An error in the description of a device, because of which the device cannot be made.
 
     Attributes:
-        reason: the text of the message.
-        keys: place of the error within the table of the device.
+        reason: text of the error message.
+        keys: keys that lead to the error within the device's table in the rig file.
     """
 
     reason: str
@@ -81,10 +81,10 @@ class WrongDevice(NamedTuple):
 
 
 def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
-    """Make a device of a rig file, and return its properties.
+    """Make a device of a rig file on trial, and return what is needed to check the file.
 
     Args:
-        plan: plan of the device in the rig file.
+        plan: description of the device in the rig file.
         seed: seed of all random numbers, for a device on a serial line.
 
     Returns:
@@ -245,10 +245,12 @@ _UNREAD = SignalSpec(Constant(0.0))
 
 
 class StartReader:
-    """Reads initial inputs and signals, and checks them together.
+    """Reads from a rig file the initial values of inputs and the signals that drive inputs.
+
+    They are checked together, because a formula may name signals of other tables.
 
     Args:
-        folder: folder of the files with tables.
+        folder: folder of the files with tables of values.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -269,12 +271,15 @@ class StartReader:
         return dict(self._signals)
 
     def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
-        """Read the initial inputs of a device.
+        """Read the table of a rig file with the initial inputs of a device.
 
         Args:
             device: name of the device.
             section: table with the initial inputs.
             physical: inputs and outputs of the device.
+
+        Returns:
+            Initial values or signals, by name of the input.
         """
         start: Start = {}
         names: list[str] = []  # a node has many objects
@@ -351,11 +356,14 @@ class StartReader:
 
 
 def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, dict[str, Setting]]:
-    """Read `[safe]`: for each device the safe values of outputs at the end of a test.
+    """Read the table `[safe]` of a rig file: values that outputs must have at the end of a test.
 
     Args:
         section: table `[safe]`.
-        devices: devices by name.
+        devices: inputs and outputs of the devices, by name of the device.
+
+    Returns:
+        The values by device and output.
     """
     safe: dict[str, dict[str, Setting]] = {}
     for device, table in section.subs():

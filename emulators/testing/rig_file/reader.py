@@ -349,7 +349,7 @@ _MAX_MB: Final = 4
 
 
 def read_rig_file(path: Path) -> RigPlan:
-    """Read a rig file, or a bus.yml as a rig file.
+    """Read a rig file, or the bus.yml of a CANopen bus as a rig file.
 
     Args:
         path: path of the file. Names of other files are relative to its folder.
@@ -401,11 +401,11 @@ def decode_rig_file(data: bytes, path: Path) -> RigPlan:
 
 
 def parse_rig_file(text: str, path: Path) -> RigPlan:
-    """Read the text of a rig file; see `read_rig_file`.
+    """Parse the text of a rig file, as `read_rig_file` does with a file.
 
     Args:
         text: content of the file.
-        path: path of the file, which need not exist.
+        path: path of the file, for messages and relative paths. The file need not exist.
     """
     if reason := _no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))

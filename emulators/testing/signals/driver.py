@@ -71,12 +71,14 @@ class _SignalScope:
         self.signals, self.devices = signals, devices
 
     def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
-        """Look up a name of a formula: return the name of a signal, or an input or output, or None.
+        """Return what a name in a formula stands for, or None if it is unknown.
+
+        It is the name of a signal, or an input or output of a device.
 
         Args:
             name: name as in a formula: a signal, an input or output of the owner's device,
                 `DEVICE.NAME`, or `DEVICE/NAME` in quotes.
-            owner: name of the signal with the formula.
+            owner: name of the signal that has the formula.
         """
         own, slash, _ = owner.partition(SLASH)
         full = name if SLASH in name else name.replace(".", SLASH, 1)
@@ -130,12 +132,14 @@ class _Order(ValueError):  # noqa: N818 - reported as a mistake
 def check_signals(
     signals: Mapping[str, SignalSpec], devices: Mapping[str, HasSignals]
 ) -> list[SignalMistake]:
-    """Check the signals of a bench: unknown names, values out of range, circular references.
+    """Return all mistakes in the signals of a bench.
+
+    These are unknown names, values out of range and circular references.
 
     Args:
-        signals: signals by name. `DEVICE/INPUT` drives that input, and any other name is for
-            formulas.
-        devices: devices by name.
+        signals: signals by name. A signal named `DEVICE/INPUT` drives that input; any other name is
+            for use in formulas.
+        devices: inputs and outputs of the devices, by name of the device.
 
     Returns:
         All mistakes. The first key of a mistake is the name of the signal.
@@ -477,7 +481,11 @@ class SignalDriver(Copyable):
         return tuple(self._nodes)
 
     def release(self, name: str) -> None:
-        """Stop driving an input by its signal; do nothing if no signal drives the input."""
+        """Stop driving an input by its signal; do nothing if no signal drives it.
+
+        Args:
+            name: name of the input as `DEVICE/INPUT`.
+        """
         self._targets.pop(name, None)
 
 
@@ -491,7 +499,7 @@ class _Target(Copyable):
         self._value: Setting | None = None
 
     def take(self, value: Setting) -> str:
-        """Set the input to a value if it differs; return the reason if it stays unchanged."""
+        """Set the driven input to a value if its value differs; return an error message, or ""."""
         if not isinstance(value, str):
             value = min(max(value, self._item.low), self._item.high)
             if not isfinite(value):

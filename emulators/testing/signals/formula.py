@@ -59,13 +59,13 @@ _Term = _FormulaNumber | _Name | _Call
 
 @dataclass(frozen=True, slots=True)
 class Formula(Immutable):
-    """A formula that computes a value from signals and the time.
+    """A parsed formula that computes a signal from other signals and the time.
 
     Attributes:
         text: the formula as written.
         term: the parsed formula.
-        names: names of the signals in the formula, in order, without `t`.
-        timed: whether the formula contains `t`.
+        names: names of the signals in the formula, in order, without the time `t`.
+        timed: whether the formula contains the time `t`.
     """
 
     text: str
@@ -74,10 +74,10 @@ class Formula(Immutable):
     timed: bool
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Return the value of the formula; it is `nan` or `inf` as in IEEE 754 if not finite.
+        """Return the value of the formula, which is `nan` or `inf` (IEEE 754) if it is not finite.
 
         Args:
-            values: values of the names, and of `t` in seconds.
+            values: values of the names in the formula, and of the time `t` in seconds.
         """
         return _value(self.term, values)
 
@@ -167,7 +167,7 @@ _OPERATORS: Final[dict[type[ast.AST], str]] = {
 
 
 def parse_formula(text: str) -> Formula:
-    """Read the text of a formula.
+    """Parse the text of a formula that computes a signal.
 
     Raises:
         ValueError: the text is not a formula, is too long, or has an unknown name or function.

@@ -36,13 +36,13 @@ class SignalSource(Protocol):
         ...
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the next time after `t_us` with another value, or `NEVER` if the value stays."""
+        """Return the next time after `t_us` at which the value changes, or `NEVER` if it stays."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Constant(Immutable):
-    """A value that stays: a number, or the words of a text.
+    """A signal with a constant value: a number, or the words of a text.
 
     Attributes:
         setting: the value.
@@ -66,13 +66,13 @@ class Constant(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class RampSource(Immutable):
-    """A straight line from one value to another.
+    """A signal that changes on a straight line from one value to another.
 
     Attributes:
-        first: the value at time 0.
-        last: the value at the end.
-        over_us: duration of the change.
-        repeat: whether the ramp starts again at the first value, as a saw-tooth. If not, the value
+        first: value at time 0.
+        last: value at the end.
+        over_us: duration of the change in microseconds.
+        repeat: whether the ramp starts again at the first value, as a saw-tooth. If not, the signal
             stays at the last value.
     """
 
@@ -109,16 +109,16 @@ SHAPES: Final[dict[str, Callable[[float], float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Wave(Immutable):
-    """A periodic value between two limits.
+    """A periodic signal between two limits.
 
     Attributes:
         shape: `sine`, `triangle` or `square`. A `sine` begins in the middle and moves to the second
             limit. A `triangle` or a `square` begins at the first limit.
         first: the first limit.
         second: the second limit.
-        period_us: duration of a period.
-        phase_us: time by which the wave is ahead.
-        duty: part of a period in which a square has the second value.
+        period_us: duration of a period in microseconds.
+        phase_us: time by which the wave is ahead, in microseconds.
+        duty: part of a period in which a square has the second value, 0 to 1.
     """
 
     shape: str
@@ -155,15 +155,16 @@ class Wave(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Noise(Immutable):
-    """Random values, drawn every `every_us`. The value at a given time is always the same.
+    """A random signal with a new value every `every_us`. The value at a time is reproducible.
 
     Attributes:
         first: mean of gaussian noise, or smallest value of uniform noise.
         second: standard deviation of gaussian noise, or largest value of uniform noise.
         uniform: whether the noise is uniform between two values. Otherwise it is gaussian.
-        every_us: time for which a value stays.
+        every_us: time for which a value stays, in microseconds.
         seed: seed of the values, or None to use the seed of the bench.
-        stream: number of the noise. Different numbers with the same seed give independent values.
+        stream: text that distinguishes several noises. Different texts with the same seed give
+            independent values.
     """
 
     first: float
@@ -196,12 +197,13 @@ class Noise(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class ValueTable(Immutable):
-    """A value that follows a table of times and values.
+    """A signal that follows a table of times and values.
 
-    The first value also holds before its time, and the last value also holds after its time.
+    Before the first time the signal has the first value, and after the last time the last value.
 
     Attributes:
-        times_us: times in ascending order. Two equal times are a jump of the value.
+        times_us: times in microseconds, in ascending order. Two equal times are a jump of the
+            value.
         values: the value at each time.
         linear: whether to interpolate linearly. If not, each value holds until the next time.
         repeat: whether the table starts again from 0 at its last time.
@@ -252,12 +254,14 @@ _SETTLED: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Lag(Immutable):
-    """A value that follows another: it covers 63 % of the distance in `tau_us` (first order).
+    """A signal that follows a formula with a first-order lag.
+
+    After a step of the formula it covers 63 % of the distance in `tau_us`.
 
     Attributes:
-        formula: value that the lag follows.
-        tau_us: time constant of the lag.
-        start: first value, or None to use the first value of the formula.
+        formula: formula whose value the signal follows.
+        tau_us: time constant of the lag, in microseconds.
+        start: initial value, or None to use the first value of the formula.
     """
 
     formula: Formula
@@ -277,11 +281,11 @@ class Lag(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Integral(Immutable):
-    """The integral of another value over time, in the unit of that value times seconds.
+    """A signal that is the integral of a formula over time, in the formula's unit times seconds.
 
     Attributes:
-        formula: value to integrate.
-        start: first value of the integral.
+        formula: formula whose value is integrated.
+        start: initial value of the integral.
     """
 
     formula: Formula
@@ -298,16 +302,16 @@ class Integral(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class SignalSpec(Immutable):
-    """The description of a signal: a value that may change with time.
+    """The description of a signal, which is a value that may change with time.
 
     Attributes:
         source: source of the values.
-        from_us: start time of a source that depends on time. Before this time the source stands
-            still.
-        every_us: time for which a value is held. With 0 there is a new value at each tick of the
-            rig.
-        low: the least value.
-        high: greatest value.
+        from_us: start time of a source that depends on time, in microseconds. Before this time the
+            source stands still.
+        every_us: time for which a value is held, in microseconds. With 0 there is a new value at
+            each tick of the rig.
+        low: least value; smaller values of the source are limited to it.
+        high: greatest value; larger values of the source are limited to it.
         step: quantisation: values are rounded to multiples of this number. 0 means no rounding.
     """
 
@@ -342,10 +346,10 @@ Keys = tuple[str | int, ...]
 
 
 class SignalMistake(NamedTuple):
-    """A mistake in the description of a signal.
+    """A mistake in the description of a signal, for an error message.
 
     Attributes:
-        keys: place of the mistake in the file.
+        keys: keys that lead to the mistake in the rig file.
         reason: text with the value that was found, and the values that are allowed.
 
     >>> print(SignalMistake(("signal", "load", "over"), "it is missing"))

@@ -135,14 +135,14 @@ FORMS: Final[Mapping[str, _Form]] = {
 def read_signal_spec(
     value: object, keys: sources.Keys = (), folder: Path | None = None
 ) -> sources.SignalSpec | list[sources.SignalMistake]:
-    """Read the TOML value of a signal.
+    """Read the description of a signal from its TOML value in a rig file.
 
-    `check_signals` checks whether the signals named in a formula exist.
+    Whether the signals named in a formula exist is checked later, by `check_signals`.
 
     Args:
         value: number, true or false, text, or table (docs/reference/bench/signals.md).
-        keys: place of the value in the file, for mistakes.
-        folder: folder of files with tables. The default is the working directory.
+        keys: keys that lead to the value in the file, for error messages.
+        folder: folder of files with tables of values. The default is the working directory.
 
     Returns:
         The signal, or all mistakes in it.

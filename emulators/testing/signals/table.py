@@ -58,7 +58,7 @@ def _usual_interpolation(path: Path) -> str:
 
 
 def read_points(path: Path, column: str | None) -> _Points:
-    """Read a column of a file.
+    """Read the times and values of a signal from one column of a file.
 
     Args:
         path: path of a CSV file, a trace, or a CAN log. The suffix selects the format.
@@ -197,7 +197,7 @@ _INTERPOLATIONS: Final = ("linear", "hold")
 
 
 def read_table(folder: Path, fields: Mapping[str, Any]) -> ValueTable:
-    """Return the table from the fields of a signal.
+    """Make a signal that follows a table, from the keys of its description in a rig file.
 
     Args:
         folder: folder of the files.

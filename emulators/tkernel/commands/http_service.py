@@ -29,7 +29,7 @@ _LOG: Final = logging.getLogger(__name__)
 
 
 class HttpService:
-    """Serves a resolution service by HTTP, in its own threads, as long as it is reachable.
+    """HTTP server of an emulated ucode resolution service, in its own threads.
 
     Args:
         service: the service, whose `base` becomes the address of this server.
@@ -50,9 +50,10 @@ class HttpService:
         service.base = self.url = f"http://{_LOOPBACK}:{self._port}"
 
     def follow(self) -> None:
-        """Listen unless the fault `unreachable` is active; call this method periodically.
+        """Stop listening while the fault `unreachable` is active, and listen again after it.
 
-        If another program has taken the port, a message is logged and the port is tried again.
+        This method must be called periodically. If another program has taken the port, a message is
+        logged and the port is tried again.
         """
         if not self._service.reachable:
             self._hang_up()
@@ -136,7 +137,9 @@ def _read_table(path: Path) -> UcodeTable:
 def run_service(
     table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...], example: bool
 ) -> None:
-    """Serve until a request ends the service, or print an example table.
+    """Serve a table of ucodes over HTTP until a request or Ctrl-C ends the service.
+
+    With `example` only print an example table.
 
     Raises:
         Refused: the options cannot be carried out.

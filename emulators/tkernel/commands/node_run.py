@@ -124,10 +124,10 @@ class _NodeRun:
         schedule.add_item(self._board)
 
     def run(self) -> None:
-        """Run until a request or Ctrl-C ends the run.
+        """Run the board until a request or Ctrl-C ends the run.
 
         Raises:
-            Refused: the system cannot run on this node, or a socket cannot be opened.
+            Refused: the board cannot run these RT components, or a socket cannot be opened.
         """
         with warnings_shown(), ExitStack() as stack:
             stack.enter_context(stopped_by_signals(self._runner.stop))

@@ -16,11 +16,11 @@ _LINES = 20
 
 
 class BenchTestCase(unittest.TestCase):
-    """A test case whose tests each have a fresh bench, closed when the test is over.
+    """Base class for unittest test cases: each test gets a new bench, which is closed at its end.
 
     Derive your test case from this class and write `make_bench`. A test is skipped if it uses an
-    operation that the bench cannot do. A test that fails has a note with the last lines and frames
-    of the bench.
+    operation that the bench cannot do. The error of a failed test has a note with the last lines
+    and frames of the bench.
 
     Attributes:
         bench: the bench of the present test, from `setUp` on.

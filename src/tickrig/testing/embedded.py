@@ -31,10 +31,11 @@ def port(bench: Bench) -> str:
 
 @pytest.fixture(scope="session")
 def target(request: pytest.FixtureRequest) -> Any:
-    """Value of `--target` of pytest-embedded, or the target of labgrid if `--lg-env` is given.
+    """Fixture of pytest-embedded: the value of `--target`, or labgrid's target with `--lg-env`.
 
-    labgrid and pytest-embedded both have a fixture of this name. Where both are installed,
-    pytest-embedded gets the fixture of labgrid, which skips each test that has no `--lg-env`.
+    labgrid and pytest-embedded both have a fixture with this name. If both are installed,
+    pytest-embedded would get the fixture of labgrid, which skips each test without `--lg-env`. This
+    fixture replaces both.
     """
     if request.config.getoption("lg_env", None):
         return request.getfixturevalue("env").get_target()

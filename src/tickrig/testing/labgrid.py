@@ -24,7 +24,7 @@ _NUMBER = attr.validators.instance_of(float)
 @target_factory.reg_resource
 @attr.s(eq=False)
 class TickrigBench(Resource):
-    """The bench of a rig file.
+    """labgrid resource for the bench of a rig file.
 
     Attributes:
         rig: path of the rig file, relative to the environment file.
@@ -41,7 +41,7 @@ class TickrigBench(Resource):
 @target_factory.reg_driver
 @attr.s(eq=False)
 class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
-    """Console and power of a bench, and the bench itself.
+    """labgrid driver for the console and the power of a device on a bench.
 
     Activating the driver opens the bench with the supply on. Deactivating the driver closes the
     bench.

@@ -21,10 +21,11 @@ _KEPT: Final = 10_000
 
 
 class BenchLibrary:
-    """Keywords for a bench of emulated or real devices, one bench at a time.
+    """Library of Robot Framework with keywords for a bench of emulated or real devices.
 
-    A test that fails shows the last lines and frames of its bench, and the bench is closed when the
-    test is over. If the bench has several devices, the name of a signal is `DEVICE/NAME`.
+    One bench is open at a time. A test that fails shows the last lines and frames of its bench, and
+    the bench is closed when the test is over. If the bench has several devices, the name of a
+    signal is `DEVICE/NAME`.
 
     Attributes:
         ROBOT_LIBRARY_SCOPE: scope of the library: each test has its own instance.
@@ -95,7 +96,7 @@ class BenchLibrary:
         return self.bench[device] if device else self.bench
 
     def advance(self, duration: str) -> None:
-        """Advance the time of the bench by a duration: ``100ms``, ``2s``.
+        """Advance the time of the bench by a duration, such as ``100ms`` or ``2s``.
 
         Args:
             duration: duration with its unit.
@@ -103,7 +104,7 @@ class BenchLibrary:
         self.bench.run_for(duration)
 
     def send(self, text: str, device: str = "", end: str = r"\n") -> None:
-        r"""Send a line as the host; ``\xhh`` stands for a byte in hex.
+        r"""Send a line of text to a device, as its host; ``\xhh`` stands for a byte in hex.
 
         Args:
             text: the line without its end.
@@ -113,7 +114,7 @@ class BenchLibrary:
         self._link(device).send(unescape(text + end))
 
     def send_frame(self, frame: str, device: str = "") -> None:
-        """Send a CAN frame in candump's notation, such as ``701#05``.
+        """Send a CAN frame as a host, in candump's notation, such as ``701#05``.
 
         Args:
             frame: the frame in candump's notation.
@@ -127,9 +128,10 @@ class BenchLibrary:
         return self._links[device]
 
     def expect(self, pattern: str, within: str = "1s", device: str = "") -> str:
-        """Wait for a line or a frame of a device, and return it.
+        """Wait for a line or a CAN frame from a device, and return it.
 
-        Lines that have arrived since the last expected line count, too.
+        A line that arrived earlier counts, too, if it arrived after the line of the last
+        ``Expect``.
 
         Args:
             pattern: the whole line, or the frame in candump's notation; ``*`` stands for anything.
@@ -155,7 +157,7 @@ class BenchLibrary:
         return passed[-1]
 
     def order_fault(self, fault: str, duration: str | None = None) -> None:
-        """Start a fault, now or at a time: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
+        """Start a fault now, or schedule it, as in ``cut``, ``cut@2s-3s`` or ``axis2/sdo_slow=2s``.
 
         Args:
             fault: the fault with its arguments.
@@ -172,7 +174,7 @@ class BenchLibrary:
         self.bench.clear(name)
 
     def press(self, button: str, duration: str = "100ms") -> None:
-        """Press a button and release it.
+        """Press a button of the device, and release it after a duration.
 
         Args:
             button: name of the button.
@@ -181,36 +183,36 @@ class BenchLibrary:
         self.bench.press(button, duration)
 
     def set_input(self, name: str, *values: str) -> None:
-        """Set an input, or all inputs of a group.
+        """Set an input of the device, or all inputs of a group.
 
         Args:
             name: name of the input or group.
-            *values: one value, or one value for each input of the group.
+            *values: one value for an input, or one value for each input of the group.
         """
         self.bench.set(name, *(parse_setting(str(value)) for value in values))
 
     def get_signal(self, name: str) -> Setting:
-        """Return the value of an input, output, or object of a CANopen node (``axis2/0x6041``).
+        """Return the present value of an input, an output or an object of a CANopen node.
 
         Args:
-            name: name of the signal.
+            name: name of the signal, such as ``state``, or ``axis2/0x6041`` for an object.
         """
         return self.bench.get(name)
 
     def signal_should_be(self, name: str, value: str, within: str = "0ms") -> None:
-        """Wait until a signal has a value.
+        """Fail unless a signal has a value, or gets the value within a time.
 
         Args:
-            name: name of the signal.
+            name: name of the input, output or object.
             value: the expected value.
-            within: longest wait.
+            within: longest wait; by default the value must be there at once.
         """
         wanted, bench = parse_setting(str(value)), self.bench
         if not bench.wait_until(lambda: bench.get(name) == wanted, within):
             raise AssertionError(f"{name} is {bench.get(name)!r}, not {wanted!r} within {within}")
 
     def switch_off(self, device: str = "") -> None:
-        """Switch the supply off.
+        """Switch off the supply of a device.
 
         Args:
             device: name of the device to switch off; by default all devices.
@@ -218,7 +220,7 @@ class BenchLibrary:
         self._of(device).switch_off()
 
     def switch_on(self, device: str = "") -> None:
-        """Switch the supply on.
+        """Switch on the supply of a device.
 
         Args:
             device: name of the device to switch on; by default all devices.
