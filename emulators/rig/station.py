@@ -109,8 +109,8 @@ class Timetable(TimetableFields):
     Attributes:
         first_us: time of the first tick with work, or `NEVER` if there is none.
         open_us: earliest time at which a tick can be entered.
-        in_step: 1 while a step of the rig is running, otherwise 0. The flag is stored here for the
-            compiled kernel, which saves 2 % of the time of an SDO transfer.
+        in_step: flag that is 1 while a step of the rig is running, otherwise 0. It is stored here
+            for the compiled kernel, which saves 2 % of the time of an SDO transfer.
     """
 
     __slots__ = ()

@@ -120,7 +120,7 @@ class Rs485Line(Copyable):
         return end_us
 
     def cut(self, sender: Rs485End, now_us: int) -> int:
-        """Discard bytes that a station has queued, except those that have begun to be sent.
+        """Discard bytes that a station has queued, except the byte that is being sent.
 
         Args:
             sender: end of the station.

@@ -475,7 +475,7 @@ class SimSerial(_SimPort):
     # Breaks
 
     def send_break(self, duration: float = 0.25) -> None:
-        """Send a break: hold the line at 0, and advance the virtual time meanwhile.
+        """Send a break: hold the line at 0 for a duration of virtual time.
 
         Args:
             duration: duration of the break in seconds.

@@ -179,7 +179,7 @@ class DoorJournal(Journal):
             wire: name of the bus.
             watch: monitor of the connection that has recorded the frames.
             frames: the recorded frames.
-            by: 1 to note the frames, or -1 to withdraw the note.
+            by: the value 1 notes the frames, and -1 withdraws the note.
         """
         with self._lock:
             self._announce(wire, watch, frames, by)
