@@ -145,9 +145,9 @@ class Wire(Protocol):
         """Advance to `now_us`, and wake the receivers."""
 
     def advance_until_received(self, until_us: int, /) -> bool:
-        """Advance the wire until traffic wakes a station.
+        """Advance the wire until arriving traffic wakes a device of the rig.
 
-        Returns False if no station was woken by `until_us`.
+        Returns False if no device was woken by `until_us`.
         """
         ...
 

@@ -163,16 +163,16 @@ class _Wires(Part):
             self._wires[place].advance(now_us)
 
     def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
-        """Advance all wires to a time, but stop before a tick for which a station was woken.
+        """Advance all wires to a time, but stop before a tick for which a device was woken.
 
-        Arriving traffic wakes the station that receives it.
+        Arriving traffic wakes the device that receives it.
 
         Args:
             until_us: time to which the wires advance at most, in microseconds.
             hosts: hosts for which arriving traffic also stops the advance.
 
         Returns:
-            False if no transmission ends by `until_us` and no station was woken.
+            False if no transmission ends by `until_us` and no device was woken.
         """
         if not self._busy:
             return False

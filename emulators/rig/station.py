@@ -122,9 +122,9 @@ class Timetable(TimetableFields):
 
     @in_kernel
     def enter(self, station: Station[Any], at_us: int) -> None:
-        """Plan a call of a station at its first tick from `at_us` on.
+        """Plan a call of a station (a device at its port) at its first tick from `at_us` on.
 
-        An earlier planned tick of the station stays.
+        If an earlier tick is already planned for the station, that tick stays planned.
         """
         if at_us >= station.at_us:
             return

@@ -254,7 +254,7 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Compare hosts with a new setting of the device from now on.
+        """Compare the setting of hosts with a new setting of the device from now on.
 
         The bytes are not changed, because a pty transmits without a bit rate.
 

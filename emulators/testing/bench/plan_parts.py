@@ -256,8 +256,8 @@ def mounts_of(
     Args:
         devices: devices, device types or names of device types, by name of the device.
         seed: seed of all random numbers.
-        line: parameters of the serial lines. By default the parameters of the device type, or 115
-            200 8N1.
+        line: parameters of the serial lines. The default is the parameters of the device type, or
+            115200 8N1.
         sdo_timeout_us: time-out of the SDO servers of all nodes, or None to keep the time-outs of
             the nodes.
 

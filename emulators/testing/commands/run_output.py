@@ -418,7 +418,8 @@ class RunPage:
 
         Args:
             virtual: whether the run was in virtual time.
-            rows: rows of the table of wires, each with name, place, rate and devices.
+            rows: rows of the table of wires: the name of a wire, its address for hosts, its rate,
+                and its devices.
             paths: diagrams in which one signal is drawn over another.
 
         Raises:

@@ -120,7 +120,7 @@ class CalledSlave:
 def is_step(node: object) -> bool:
     """Return whether an object is itself the function to call each millisecond.
 
-    The user should pass a function that makes it instead.
+    `CalledSlave` refuses such an object, because it needs a function that makes it.
     """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 

@@ -251,9 +251,14 @@ def check_mode(needs: Iterable[str], mode: str) -> None:
 
 
 def check_needs(needs: Iterable[str], bench: Bench) -> None:
-    """Raise NotOnThisBench if a bench lacks something that a test needs.
+    """Check that a bench has everything that a test needs.
+
+    Args:
+        needs: names from the markers `needs` of the test.
+        bench: bench of the test.
 
     Raises:
+        NotOnThisBench: the bench lacks something.
         ValueError: a name is misspelt, so that every bench would skip the test.
     """
     for need in needs:

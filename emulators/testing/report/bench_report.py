@@ -275,9 +275,9 @@ _GROUP: Final = 4
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
     """Return a curve with at most `most` samples, which keeps the extremes of the curve.
 
-    The first and the last sample stay. Of every four samples, the two extremes stay. If one of the
-    four is a word, the first and the last of them stay. This is repeated while there are too many
-    samples.
+    The first and the last sample are kept. Of every four other samples, the two extremes are kept,
+    or the first and the last if one of the four is a word. This is repeated while there are too
+    many samples.
 
     Args:
         points: samples in order of time.

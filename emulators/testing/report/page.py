@@ -219,7 +219,8 @@ def run_page(
     Args:
         record: the run. Its `nodeid` is the title, and its `reason` is the result.
         run: environment and settings of the run.
-        wires: name, place, rate and devices of each wire.
+        wires: table of the wires: the name of a wire, its address for hosts, its rate, and its
+            devices.
         paths: diagrams in which one signal is drawn over another.
     """
     (place,) = overview.reported([record])

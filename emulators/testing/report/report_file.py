@@ -53,7 +53,7 @@ _NAMES: Final[Mapping[type, str]] = {
 
 
 class ReportError(ValueError):
-    """Raised if JSON is not a bench report of this version; the message has place and error."""
+    """Raised if JSON is not a bench report of this version; the message names the wrong part."""
 
 
 def to_data(value: Any) -> Any:  # what a value holds is open

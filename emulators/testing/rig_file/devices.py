@@ -199,7 +199,7 @@ def kind_of(
             built in.
 
     Returns:
-        The kind of the type, and the type with a path that can be opened.
+        The kind of source that the type names, and the type with a path that can be opened.
 
     Raises:
         ValueError: no such type or file exists.

@@ -118,7 +118,7 @@ class Wave(Immutable):
         second: the second limit.
         period_us: duration of a period in microseconds.
         phase_us: time by which the wave is ahead, in microseconds.
-        duty: part of a period in which a square has the second value, 0 to 1.
+        duty: part of a period in which a square has the second value, above 0 and below 1.
     """
 
     shape: str

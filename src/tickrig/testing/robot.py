@@ -174,7 +174,7 @@ class BenchLibrary:
         self.bench.clear(name)
 
     def press(self, button: str, duration: str = "100ms") -> None:
-        """Press a button of the device, and release it after a duration.
+        """Press a button of a device on the bench, and release it after a duration.
 
         Args:
             button: name of the button.
@@ -183,7 +183,7 @@ class BenchLibrary:
         self.bench.press(button, duration)
 
     def set_input(self, name: str, *values: str) -> None:
-        """Set an input of the device, or all inputs of a group.
+        """Set an input of a device on the bench, or all inputs of a group.
 
         Args:
             name: name of the input or group.

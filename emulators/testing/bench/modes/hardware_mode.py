@@ -58,8 +58,8 @@ _POLL_US: Final = 5_000
 class HardwareMode(BenchMode):
     """Mode of a bench whose devices are real, as described in the rig file.
 
-    Each device is at a port or on a bus. Its operator is a human at the terminal. An emulator may
-    stand in for a device. Its operator is then the control socket of the emulator. Conditions are
+    Each device is at a port or on a bus, and a human at the terminal operates it. If an emulator
+    stands in for a device, the bench operates the emulator by its control socket. Conditions are
     checked on all traffic, and while the bench waits.
 
     Args:
@@ -178,7 +178,7 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Return why a failed test has no valid verdict, or "" if it has.
+        """Return why the verdict of a failed test is not valid, or "" if the verdict is valid.
 
         A verdict is not valid if the host or an emulator was too late. It is always valid if a
         human has answered no.

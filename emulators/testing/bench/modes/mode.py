@@ -229,7 +229,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return why a failed test has no valid verdict, or "" if real time was kept."""
+        """Return why the verdict of a failed test is not valid, or "" if real time was kept."""
 
     def hung(self) -> str:
         """Return the error message of a host that has waited endlessly, or "" if none has."""

@@ -372,7 +372,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return why a failed test has no valid verdict, or "" if real time was kept."""
+        """Return why the verdict of a failed test is not valid, or "" if real time was kept."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us
