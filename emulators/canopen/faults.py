@@ -427,8 +427,18 @@ _OBJECT: Final = FaultArgument(
     "INDEX[:SUB][:CODE], any or CODE",
     read=_parse_target,
 )
+_ACCESSES: Final = ("both", "read", "write")
+
+
+def _parse_access(word: str) -> str:
+    if word in _ACCESSES:
+        return word
+    hint = "" if _number(word) is None else f"; an abort code follows a colon: 6040h:{word}"
+    raise ValueError(f"access {word!r} is not {' or '.join(_ACCESSES)}{hint}")
+
+
 _ACCESS: Final = FaultArgument(
-    "access", "which transfers", "both", choices=("both", "read", "write")
+    "access", "which transfers", "both", " or ".join(_ACCESSES), read=_parse_access
 )
 
 NODE_FAULTS: Final[Mapping[str, _NodeFaultType]] = {
