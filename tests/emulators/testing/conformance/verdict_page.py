@@ -31,9 +31,9 @@ versions of all programs, the page is always the same.
 
 A verdict is about one program that uses a stack, and not about the stack alone. The programs of
 this page have those objects of our reference slave R1 that the stack supports. They move inputs and
-raise errors as far as the stack allows it, and do nothing else. For example, many stacks leave it
-to the application which values an object has after a reset. Such a check fails on this page, but a
-device with the same stack may pass it.
+raise errors as far as the stack allows it, and do nothing else. For example, a stack may leave it
+to the application which values an object has after a reset. The check of these values then fails
+on this page, but a device with the same stack may pass it.
 
 """
 BY_HAND: Final = """## CANopenNode and Lely
