@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import click
+from click.shell_completion import CompletionItem
 
 from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import (
@@ -89,7 +90,9 @@ class _RrcGroup(HarmlessCommand, click.Group):
 
 
 @click.group(cls=_RrcGroup, subcommand_metavar="[VERB [ARGS]...]", invoke_without_command=True)
-@click.argument("url", type=click.Path(readable=False))
+@click.argument(
+    "url", shell_complete=lambda ctx, param, begun: [CompletionItem(begun, type="file")]
+)
 @click.option("--panel", is_flag=True, help="Show a panel in this terminal, and drive by keys.")
 @click.option(
     "--pad", metavar="DEVICE", help="Drive by a game pad while a button is held: /dev/input/event5."

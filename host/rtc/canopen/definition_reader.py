@@ -113,16 +113,22 @@ def _once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
     return read
 
 
-def whole(low: int, high: int) -> _Reader:
-    """Return a reader of a whole number in a range, written in decimal or as 0x..."""
+def _checked(allows: Callable[[Any], bool], what: str) -> _Reader:
+    """Return a reader of a scalar. `what` names the allowed values in messages."""
 
-    def read(node: Item, place: str) -> int:
+    def read(node: Item, place: str) -> Any:
         value = _plain(node)
-        if type(value) is not int or not low <= value <= high:
-            _refuse(node, f"{place}: {value!r} is not a whole number in {low}..{high}")
+        if not allows(value):
+            _refuse(node, f"{place}: {value!r} is not {what}")
         return value
 
     return read
+
+
+def whole(low: int, high: int) -> _Reader:
+    """Return a reader of a whole number in a range, written in decimal or as 0x..."""
+    what = f"a whole number in {low}..{high}"
+    return _checked(lambda value: type(value) is int and low <= value <= high, what)
 
 
 def _rate(node: Item, place: str) -> float:
@@ -131,14 +137,6 @@ def _rate(node: Item, place: str) -> float:
     if type(value) not in (int, float) or not 0 < value <= 1_000:
         _refuse(node, f"{place}: {value!r} is not a number with 0 < {place} <= 1000")
     return float(value)
-
-
-def _flag(node: Item, place: str) -> bool:
-    """Read true or false."""
-    value = _plain(node)
-    if type(value) is not bool:
-        _refuse(node, f"{place}: {value!r} is not true or false")
-    return value
 
 
 def text(node: Item, place: str) -> str:
@@ -176,6 +174,9 @@ def _member_of(kind: type[Enum]) -> _Reader:
     """Read a member of an enumeration by its value."""
     word = _one_of(*(item.value for item in kind))
     return lambda node, place: kind(word(node, place))
+
+
+_flag: Final = _checked(lambda value: type(value) is bool, "true or false")
 
 
 def _plain(node: Item) -> Any:

@@ -40,11 +40,16 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _represent(dumper: _Dumper, value: _Hex) -> yaml.ScalarNode:
+def _represent_hex(dumper: _Dumper, value: _Hex) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:int", f"0x{value:X}")
 
 
-_Dumper.add_representer(_Hex, _represent)
+def _represent_role(dumper: _Dumper, role: Role) -> yaml.ScalarNode:
+    return dumper.represent_str(role.value)
+
+
+_Dumper.add_representer(_Hex, _represent_hex)
+_Dumper.add_representer(Role, _represent_role)
 
 
 def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
@@ -83,7 +88,7 @@ def _sections(definition: SystemDefinition) -> Iterator[tuple[str, _Table | list
     yield "sdo", [_sdo(entry) for entry in definition.sdo]
     yield "pdo_links", [_link(link) for link in definition.pdo_links]
     yield "rt_connections", [_rt_connection(entry) for entry in definition.rt_connections]
-    yield "start", _plain(_changed(definition.start))
+    yield "start", _changed(definition.start)
 
 
 def _changed(value: DataclassInstance) -> _Table:
@@ -99,19 +104,8 @@ def _default(item: Field[Any]) -> object:
     return item.default if item.default_factory is MISSING else item.default_factory()
 
 
-def _plain(values: _Table) -> _Table:
-    """Return lists for tuples and texts for words of an enumeration."""
-    return {key: _plain_value(value) for key, value in values.items()}
-
-
-def _plain_value(value: object) -> object:
-    if isinstance(value, tuple):
-        return list(value)
-    return str(value) if isinstance(value, Role) else value
-
-
 def _node(node: NodeEntry) -> _Table:
-    values = _plain(_changed(node))
+    values = _changed(node)
     if node.ports:
         values["ports"] = dict(node.ports)
     if node.sdo_ports:

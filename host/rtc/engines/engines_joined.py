@@ -56,23 +56,20 @@ def engines_joined(
             except (ValueError, RuntimeError) as error:
                 raise Refused(f"--openrtm: {error}") from None
         if options.ros2 is not None:
-            stack.enter_context(_ros2_joined(options.ros2, manager, calls))
+            _join_ros2(stack, options.ros2, manager, calls)
         yield
 
 
-@contextmanager
-def _ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
-    with ExitStack() as stack:
-        try:
-            stack.enter_context(load(_ROS2)(options, manager, calls))
-        except ImportError as error:
-            if (error.name or "").partition(".")[0] != "cyclonedds":
-                raise
-            raise Refused(_NEEDS_CYCLONE) from None
-        except OSError as error:
-            refuse_path("ros2-table", error)
-        except UnicodeDecodeError as error:
-            raise Refused(f"ros2-table {options.table}: byte {error.start} is no UTF-8") from None
-        except ValueError as error:
-            raise Refused(f"--ros2: {error}") from None
-        yield
+def _join_ros2(stack: ExitStack, options: Ros2Options, manager: Manager, calls: CallQueue) -> None:
+    try:
+        stack.enter_context(load(_ROS2)(options, manager, calls))
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] != "cyclonedds":
+            raise
+        raise Refused(_NEEDS_CYCLONE) from None
+    except OSError as error:
+        refuse_path("ros2-table", error)
+    except UnicodeDecodeError as error:
+        raise Refused(f"ros2-table {options.table}: byte {error.start} is no UTF-8") from None
+    except ValueError as error:
+        raise Refused(f"--ros2: {error}") from None
