@@ -341,15 +341,11 @@ def stamp_text(
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
     """
-    match stamp:
-        case Stamp.DELTA:
-            return seconds_text(at_us - before_us, digits[1])
-        case Stamp.ABSOLUTE:
-            return seconds_text(at_us, digits[0])
-        case Stamp.DATE:
-            return date_text(at_us)
-        case _:
-            return seconds_text(at_us - origin_us, digits[1])
+    if stamp is Stamp.DATE:
+        return date_text(at_us)
+    if stamp is Stamp.ABSOLUTE:
+        return seconds_text(at_us, digits[0])
+    return seconds_text(at_us - (before_us if stamp is Stamp.DELTA else origin_us), digits[1])
 
 
 class DumpLines:
