@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.node_memory import BITS, drive_state
 from tickrig.host.canmon.model.decode.services import nmt_state_name
-from tickrig.host.canmon.model.frames import EXTENDED, Record, Stamp, flagged_id
+from tickrig.host.canmon.model.frames import EXTENDED, Record, Stamp
 from tickrig.host.canmon.model.traffic import NO_RATES, BitRates
 from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame, FdFrame, frame_bits
 from tickrig.wire.canopen.emcy import describe
@@ -521,8 +521,9 @@ class Collector:
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
         """Add the values in a frame that is already decoded, or has none of the wanted objects."""
         at_us, _, frame, _ = record
-        if self._slices:  # a key has no flag of a remote or error frame
-            for cut, series in self._slices.get(flagged_id(record), ()):
+        if not isinstance(frame, ErrorFrame) and not frame.remote:
+            key = frame.can_id | EXTENDED if frame.extended else frame.can_id
+            for cut, series in self._slices.get(key, ()):
                 value = cut.value(frame.data)
                 if value is not None:
                     series.append(at_us, value)
