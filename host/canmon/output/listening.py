@@ -295,7 +295,8 @@ class _Interruptions(Interrupter):
 def until_interrupted() -> Iterator[_Interruptions]:
     """End the block at Ctrl-C and at signals that end a program. Continue after the block."""
     interruptions = _Interruptions()
-    with suppress(KeyboardInterrupt), taking_signals(interruptions.received):
+    # In this order, Ctrl-C before the block ends the command.
+    with taking_signals(interruptions.received), suppress(KeyboardInterrupt):
         yield interruptions
 
 
