@@ -222,14 +222,20 @@ def press(name: str, duration: str) -> Object:
 
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
-def fault(spec: str) -> Object:
+@click.option("--for", "duration", help="How long, as 2s.  [until it is cleared]")
+def fault(spec: str, duration: str | None) -> Object:
     """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]. Times count from the start.
 
     Times with +, as in cut@+1s-+2s, count from now.
 
     \b
     tickrig ctl /tmp/rrc.ctl fault flip=0.001
+    tickrig ctl /tmp/rrc.ctl fault cut --for 2s
     """  # noqa: D301 - click wants the backspace
+    if duration is not None:
+        if "@" in spec:
+            raise Refused(f"--for {duration}: {spec!r} has times of its own; give one of both")
+        spec += f"@+0s-+{time_us('--for', duration)}us"
     return {"spec": spec}
 
 

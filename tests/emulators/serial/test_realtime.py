@@ -186,6 +186,8 @@ def test_each_mistake_at_the_control_socket_is_one_line(tmp_path: Path) -> None:
                 ("press", "power_button", "--for", "1x"),
                 "Error: --for: '1x' is not a time: write",
             ),
+            (("fault", "cut", "--for", "1x"), "Error: --for: '1x' is not a time: write"),
+            (("fault", "cut@1s", "--for", "2s"), "Error: --for 2s: 'cut@1s' has times of its own"),
             (("fault", "flip=2"), "Error: flip takes a rate above 0 and up to 1"),
             (("clear", "x"), "Error: no fault 'x'; known: flip, drop, dup, cut, delay, "),
             (("get", "x"), 'Error: no input or output "x"; known: rrc_power'),
@@ -207,6 +209,10 @@ def test_the_control_commands_answer_people_and_programs(tmp_path: Path) -> None
         assert json.loads(child.ctl("set", "stick", "-5", "5", "--json").stdout)["ok"]
         for words in (("fault", "flip=0.5"), ("fault", "cut"), ("clear", "cut")):
             assert child.ctl(*words).exit_code == 0
+        assert "faults flip\n" in child.ctl("status").stdout
+        assert child.ctl("fault", "cut", "--for", "300ms").exit_code == 0
+        while "faults flip cut\n" in child.ctl("status").stdout:
+            pass  # it ends by itself
         assert "faults flip\n" in child.ctl("status").stdout
         assert child.ctl("stop").exit_code == 0
         assert child.process.wait(timeout=START_S) == 0
