@@ -24,10 +24,12 @@ def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def unknown(words: Iterable[str]) -> list[str]:
-    """Yield an error for each word that matches no check, with a suggestion.
+    """Yield an error message for each pattern of `--only` that matches no conformance check.
+
+    Each message suggests the most similar name.
 
     Args:
-        words: names of groups or ids, with * and ?.
+        words: patterns of check ids or names of check groups. `*` and `?` are wildcards.
     """
 
     def is_one(word: str) -> bool:
@@ -77,15 +79,18 @@ _NAMED: Final = ", which --eds FILE names"
 
 
 def listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str]:
-    """Yield a line for each check, of any level, and then a line for each group.
+    """Yield the lines of `canmon conform --list`: one line per check, then one line per group.
+
+    Checks of all levels are listed, also those that change the node.
 
     Args:
-        only: names of groups or ids, with * and ?, in upper or lower case. If it is empty, all
-            checks are listed.
-        device: device of an EDS, used for the checks of its objects.
+        only: patterns of check ids or names of check groups, in upper or lower case. `*` and `?`
+            are wildcards. If it is empty, all checks are listed.
+        device: device that the EDS describes, which adds one or more checks for each of its
+            objects, or None without an EDS.
 
     Raises:
-        Refused: a word matches no check.
+        Refused: a pattern matches no check.
     """
     checks = [*_chosen(only), *_of_objects(only, device)]
     wide = max((len(check.id) for check in checks), default=0) + 2

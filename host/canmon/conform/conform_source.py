@@ -81,17 +81,17 @@ class ConformSource:
 def open_conform_source(
     word: str | None, node_id: int | None, options: BusOptions
 ) -> ConformSource:
-    """Open the SOURCE of the command line.
+    """Open the CAN bus or the rig file on which `canmon conform` tests a node.
 
     Args:
-        word: word on the command line, such as `can0`, `slcan:/dev/ttyACM0@500k` or a rig file
-            `bench.toml`, or None if the options name a bus.
-        node_id: node-ID of the node, which selects the bus of a rig with several buses. None
-            selects the first bus.
-        options: options of a bus, such as interface and bit rate.
+        word: SOURCE argument of the command line, such as `can0`, `slcan:/dev/ttyACM0@500k` or a
+            rig file `bench.toml`, or None if the options name a bus.
+        node_id: node-ID of the node under test. If the rig has several buses, the one with this
+            node is used. None selects the first bus.
+        options: bus options of the command line, such as interface and bit rate.
 
     Raises:
-        Refused: the source is not a bus with nodes.
+        Refused: the source is not a bus with nodes, for example a log file.
         SourceFailed: the source cannot be opened.
     """
     if word is None and not options:

@@ -55,10 +55,13 @@ _HTML: Final = "--html"
 
 
 def _check_files(files: Mapping[str, Path]) -> None:
-    """Raise Refused if one of the files cannot be written.
+    """Check before the run that all output files of the command can be written.
+
+    Raises:
+        Refused: a file cannot be written.
 
     Args:
-        files: path of each file by option.
+        files: path of each output file by its option, such as `--html`.
     """
     for option, path in files.items():
         with refusing():
@@ -105,14 +108,14 @@ def _write_files(
 
 
 def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames) -> str:
-    """Return the content of the file that an option requests.
+    """Return the text of the output file that an option of `canmon conform` requests.
 
     Args:
-        option: name of the option, such as `--html`, `--junit`, `--badge` or `--issue`. For any
-            other name, the content is the failures as a baseline.
+        option: name of the option: `--html`, `--junit`, `--badge` or `--issue`. For any other name
+            the text is a baseline file with the failures of the run.
         report: report of the run.
-        baseline: baseline of known failures.
-        show: function that formats frames.
+        baseline: failures that the user has declared as known.
+        show: function that formats the recorded frames as lines.
     """
     match option:
         case "--html":
@@ -133,13 +136,14 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 
 
 def decoded_frames(eds: Mapping[int, Path]) -> ShowFrames:
-    """Return a function that formats the frames of a check and their meaning as lines.
+    """Return a function that formats the recorded frames of a check and their meaning.
 
-    Each call knows only the EDS at its beginning. Transfers and mappings of earlier checks do not
-    count, because the frames between two checks are not recorded.
+    Each call of this function decodes the frames of one check. It starts with the EDS only: SDO
+    transfers and PDO mappings of earlier checks are unknown, because the frames between two checks
+    are not recorded.
 
     Args:
-        eds: EDS by node-ID.
+        eds: EDS file, or the objects that were read from it, by node-ID.
 
     Raises:
         OSError: an EDS cannot be read.
@@ -170,15 +174,15 @@ _FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
 
 class Conformance:
-    """One call of the command `canmon conform`.
+    """One run of the command `canmon conform`, from its options to its report.
 
     Args:
-        word: SOURCE word on the command line, or None if the options name a bus.
-        bus: options of the bus.
+        word: SOURCE argument of the command line, or None if the options name a bus.
+        bus: bus options of the command line.
         options: values of the other options by name.
 
     Raises:
-        Refused: the options are impossible. Nothing was sent.
+        Refused: the options are invalid, or contradict each other. No frame has been sent.
     """
 
     def __init__(self, word: str | None, bus: BusOptions, options: dict[str, Any]) -> None:

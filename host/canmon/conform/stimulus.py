@@ -45,7 +45,7 @@ _INPUTS: Final = {"6000": "di", "6401": "ai"}
 
 
 class LinearConverter(NamedTuple):
-    """A linear conversion of an input to its object.
+    """Linear conversion between an input of a device and the CANopen object that shows this input.
 
     While the input goes from `low` to `high`, the object goes from `first` to `last` in steps of
     `step`.
@@ -59,7 +59,11 @@ class LinearConverter(NamedTuple):
 
 
 class SignalStimulus(ABC):
-    """Base class of stimuli that set, read and switch signals by name, as a check requests."""
+    """Base class for stimuli, which operate the node under test while checks run.
+
+    A stimulus sets inputs, reads outputs and switches the power supply. A check requests these
+    actions by the names of the signals.
+    """
 
     def __call__(self, *words: str) -> str:
         """Execute a stimulus, and return the read value.
@@ -162,9 +166,9 @@ class SignalStimulus(ABC):
 
     @abstractmethod
     def unit(self, name: str) -> str:
-        """Return the unit of a signal, or the data type of an object.
+        """Return the unit of a signal such as `mm`, or the data type of an object.
 
-        Return an empty text without one.
+        If neither is known, the result is empty.
         """
 
     @abstractmethod
@@ -214,14 +218,15 @@ _PATIENCE_S: Final = 30
 
 
 def open_stimulus(text: str) -> Stimulus:
-    """Return the stimulus that sets the inputs of the device.
+    """Return the stimulus that operates the inputs of the node under test, by `--stimulus`.
 
     Args:
-        text: words of the option: `ask`, `control:PATH`, or the path of a control socket. Any other
-            text is a command with its arguments.
+        text: value of the option. `ask` asks the user to operate the inputs. `control:PATH`, or the
+            path of a control socket, uses the emulator that serves the socket. Any other text is a
+            command with its arguments.
 
     Raises:
-        Refused: the text has another form.
+        Refused: the text is not a command line, or `ask` is used without a terminal.
     """
     if text == _OPERATOR:
         if not sys.stdin.isatty():
@@ -250,7 +255,9 @@ def _ask_operator(*words: str) -> str:
 
 
 class CommandStimulus:
-    """Stimulus that calls a command with the words of the check appended, without a shell.
+    """Stimulus that runs an external command each time a check operates or reads a signal.
+
+    The words of the check follow the arguments of the command. No shell is used.
 
     Args:
         words: command and its arguments.
@@ -363,7 +370,7 @@ _FUNCTIONS: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
 
 
 def list_nodes(source: ConformSource) -> int:
-    """List the nodes on a bus if no node was given. Return the exit status."""
+    """Print the nodes on a bus, because the user has given no node-ID. Return the exit status."""
     found: list[dict[int, str]] = [source.nodes] if source.virtual else []
     with until_interrupted():
         if not found:
@@ -381,11 +388,12 @@ def list_nodes(source: ConformSource) -> int:
 
 
 def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
-    """Listen to a bus. Return the number of frames by node-ID.
+    """Listen to a bus for some time. Return the number of received frames by node-ID of the sender.
 
     Args:
-        link: connection to the bus. Received frames are consumed.
-        span_us: duration in microseconds.
+        link: connection to the bus. The frames received meanwhile are lost for other readers of
+            this link.
+        span_us: time to listen, in microseconds.
     """
     heard = Counter[int]()
     until_us = link.now_us + span_us
@@ -417,12 +425,14 @@ _DOES = {
 
 
 class Consent:
-    """Consent of the user, which is requested or already given.
+    """Consent of the user to tests that change a node.
+
+    The consent is given by `--yes`, or the user is asked on the terminal.
 
     Args:
         yes: whether `--yes` gives consent to all actions.
-        virtual: whether the source is a rig in virtual time, where nothing moves.
-        alone: whether there is no other node on the bus.
+        virtual: whether the node is emulated in virtual time, so that nothing real moves.
+        alone: whether the node under test is the only node on the bus.
     """
 
     def __init__(self, *, yes: bool, virtual: bool, alone: bool = False) -> None:
@@ -434,10 +444,10 @@ class Consent:
         return sys.stdin.isatty() and sys.stderr.isatty()
 
     def begin(self, node_id: int, level: Level, others: dict[int, int]) -> None:
-        """Report other nodes on the bus, and ask for consent before anything is changed.
+        """Report other nodes on the bus, and ask the user for consent to the changes of the run.
 
         Raises:
-            Refused: the answer is no, or there is no terminal to ask.
+            Refused: the user answers no, or there is no terminal on which to ask.
         """
         if others:
             say(f"also on this bus: {', '.join(f'node {each}' for each in others)}")
@@ -451,9 +461,11 @@ class Consent:
             raise Refused("not started")
 
     def confirm(self, question: str) -> bool:
-        """Ask the user. Without a terminal, the answer is no.
+        """Ask the user a yes-or-no question. Return True for yes.
 
-        In a rig, only LSS needs a question, because other nodes would also answer.
+        `--yes` answers yes without a question. Without a terminal, the answer is no. In a rig in
+        virtual time the answer is yes, except for LSS commands to all nodes while other nodes are
+        on the bus, because these nodes would also answer.
         """
         if self._yes:
             return True
@@ -465,10 +477,10 @@ class Consent:
 
 
 class Progress:
-    """A progress line of a run on a terminal. In a pipe, there is no progress line.
+    """Progress line that `canmon conform` shows on the terminal while checks run.
 
     Args:
-        shown: whether there is a terminal.
+        shown: whether to show the line. It is False if standard error is not a terminal.
     """
 
     def __init__(self, *, shown: bool) -> None:

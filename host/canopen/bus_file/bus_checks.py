@@ -72,9 +72,9 @@ def check_node_ids(
 def check_cob_ids(
     notes: BusFileNotes, master: BusMaster | None, slaves: Mapping[str, BusSlave]
 ) -> None:
-    """Report CAN-IDs that two nodes send, and CAN-IDs reserved for other services.
+    """Report CAN-IDs on which two nodes send, and CAN-IDs that are reserved for other services.
 
-    The master sends the messages that the slaves receive. Two slaves may receive the same message.
+    The RPDOs of slaves count as messages of the master. Two slaves may receive the same message.
     """
     senders: dict[int, tuple[str, FilePlace, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:
@@ -212,7 +212,11 @@ def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]
 
 
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
-    """Report the number of `canmon eds check` findings per EDS, and which of them stop dcfgen."""
+    """Return a finding for each faulty EDS of the slaves.
+
+    It contains the number of errors that `canmon eds check` finds, and the names of those that
+    prevent dcfgen from reading the EDS.
+    """
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
         found, is_unicode = _findings_of(str(sheet), read_eds_bytes(sheet))

@@ -179,13 +179,13 @@ _NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
 
 @dataclass(frozen=True, slots=True)
 class BusFile:
-    """The content of a bus.yml.
+    """The content of a bus.yml, the file in which Lely and ros2_canopen describe a CANopen bus.
 
     Attributes:
         path: path of the file.
-        options: settings of all nodes.
-        master: the master, or None if the file has no section for a master.
-        slaves: slaves that have an EDS, by name, in the order of dcfgen.
+        options: settings that apply to all nodes.
+        master: master of the bus, or None if the file has no section for a master.
+        slaves: slaves whose EDS was found, by name, in the order in which dcfgen reads them.
         findings: all errors and warnings, in the order of the lines. If one of them is an error,
             the other attributes contain only the valid parts of the file.
     """
@@ -203,7 +203,7 @@ class BusFile:
 
     @property
     def warnings(self) -> tuple[RuleFinding, ...]:
-        """The findings that dcfgen only warns about, and those that a node refuses at boot-up."""
+        """Findings that only cause a warning of dcfgen, or a refusal of a node at boot-up."""
         return self._of(Severity.WARNING)
 
     def _of(self, severity: Severity) -> tuple[RuleFinding, ...]:
@@ -211,10 +211,10 @@ class BusFile:
 
 
 def is_bus_file(data: bytes) -> bool:
-    r"""Return whether a file is a bus.yml, valid or not. The function does not need PyYAML.
+    r"""Return whether a file looks like a bus.yml, valid or not. This works without PyYAML.
 
     Args:
-        data: content of the file, or its beginning.
+        data: content of the file, or its first bytes.
 
     >>> is_bus_file(b"master:\n  node_id: 1\n"), is_bus_file(b"[device.rrc]\n")
     (True, False)
@@ -224,10 +224,13 @@ def is_bus_file(data: bytes) -> bool:
 
 
 def check_of(data: bytes, path: Path) -> str:
-    r"""Return the kind of a YAML file and the command that checks it; empty if the kind is unknown.
+    r"""Return a text that names the kind of a YAML file and the command that checks it.
+
+    The text is empty if the content is unknown. It appears in messages about a file that another
+    command cannot read.
 
     Args:
-        data: content of the file, or its beginning.
+        data: content of the file, or its first bytes.
         path: path of the file, used in the message.
 
     >>> check_of(b"master:\n  node_id: 1\n", Path("bus.yml"))

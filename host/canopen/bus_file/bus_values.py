@@ -17,7 +17,9 @@ _Extra = Mapping[str, Item]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The values that a master checks at boot-up (1F84h to 1F88h). A value of 0 is not checked.
+    """Device type and identity that the master expects of a slave at boot-up (1F84h to 1F88h).
+
+    The master does not check a value of 0.
 
     Attributes:
         device_type: device type (object 1000h).
@@ -36,13 +38,13 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class BusWrite:
-    """One entry of a concise DCF, which the master writes at boot-up.
+    """One SDO write with which the master configures a slave at boot-up, an entry of a concise DCF.
 
     Attributes:
         index: index of the object, 0x0000..0xFFFF.
         sub_index: sub-index of the object, 0..255.
-        data: bytes to write, little endian.
-        place: the line of the file that requires the write.
+        data: bytes that the master writes, little endian.
+        place: file and line of the bus.yml that requires the write.
     """
 
     index: int
@@ -53,17 +55,17 @@ class BusWrite:
 
 @dataclass(frozen=True, slots=True)
 class BusPdo:
-    """A PDO of a slave.
+    """Settings of one PDO of a slave, from the bus.yml and the EDS.
 
     Attributes:
         number: number of the PDO, 1..512.
-        transmit: whether the slave sends the PDO.
-        cob_id: COB-ID with its upper bits. If bit 31 is set, the PDO is disabled.
+        transmit: whether the slave sends the PDO (TPDO). Otherwise the slave receives it (RPDO).
+        cob_id: COB-ID as in the communication parameter. If bit 31 is set, the PDO is disabled.
         transmission: transmission type, 0..255.
         inhibit_time_100us: inhibit time of a TPDO, in units of 100 µs.
         event_timer_ms: event timer of a TPDO, or deadline of an RPDO.
         sync_start: SYNC start value of a TPDO.
-        mapping: mapped objects. An index below 0020h is a dummy object.
+        mapping: mapped objects in order. An index below 0020h is a dummy object.
     """
 
     number: int
@@ -83,10 +85,12 @@ class BusPdo:
 
 @dataclass(frozen=True, slots=True)
 class DriveChannel:
-    """An axis of a drive in ros2_canopen's 402 driver. Lengths are in units of the user.
+    """Scales and offsets of one drive axis, as the CiA 402 driver of ros2_canopen uses them.
+
+    The scales convert between the units of the user, such as rad, and the units of the device.
 
     Attributes:
-        name: name of the joint.
+        name: name of the joint that the axis moves.
         scale_pos_to_dev: device units per unit of position.
         scale_pos_from_dev: units of position per device unit.
         scale_vel_to_dev: device units per unit of speed.
@@ -249,14 +253,15 @@ class BusMaster:
 
 @dataclass(frozen=True, slots=True)
 class BusDefaults:
-    """Default settings for nodes that do not have settings of their own.
+    """The section `options` of a bus.yml: default settings for all nodes.
 
     Attributes:
-        dcf_path: folder of the DCF files at run time, as written in the file.
+        dcf_path: folder in which the master looks for the DCF files at run time, as written in the
+            file.
         heartbeat_multiplier: number of producer heartbeat times that a consumer waits for a
             heartbeat.
         retry_factor: number of attempts of node guarding.
-        extra: mapping `tickrig:` of the section.
+        extra: content of the key `tickrig:` of the section.
     """
 
     dcf_path: str = ""

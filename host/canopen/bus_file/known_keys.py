@@ -59,9 +59,9 @@ class _Allowed(NamedTuple):
     said: str
 
     def value_of(self, item: Item) -> int | None:
-        """Return the value that yaml-cpp reads, or None if the driver does not accept the value.
+        """Return the number that a driver reads from a YAML value, or None if it is refused.
 
-        yaml-cpp ignores quotes. A boolean becomes 1 or 0.
+        The driver reads with yaml-cpp, which ignores quotes. A boolean gives 1 or 0.
         """
         if not self.numbers:
             return _FLAGS.get(item.text.lower())
@@ -90,13 +90,13 @@ SETTINGS: Final = {
 def check_keys(
     section: BusFileSection, known: Iterable[str], *, open_to_others: bool = False
 ) -> None:
-    """Report unknown keys.
+    """Report the unknown keys of a bus.yml section, with a suggestion for a misspelled key.
 
     Args:
-        section: the section to check.
-        known: all keys that the section may have.
-        open_to_others: whether a driver of the user may read other keys. Other keys are then
-            reported as keys for that driver, except keys that look like a misspelling.
+        section: section of the bus.yml.
+        known: all keys that tickrig knows in this section.
+        open_to_others: whether a driver of the user may read further keys. If so, an unknown key is
+            reported as a key for that driver, unless it looks like a misspelling.
     """
     known = tuple(known)
     for key in section.fields:

@@ -17,15 +17,15 @@ _COGEN: Final = (OPTIONS, MASTER, _DEFAULTS, _NODES)
 
 
 class Layout(NamedTuple):
-    """The sections of a file as dcfgen reads them.
+    """The sections of a bus.yml, found in the same way as dcfgen finds them.
 
     Attributes:
-        options: section of options, or None if the file has none.
-        master: section of the master, or None if the file has none.
+        options: section `options`, or None if the file has none.
+        master: section `master`, or None if the file has none.
         slaves: sections of the slaves by name, in the order of dcfgen.
-        hidden: file and line of each key that begins with a dot, by name. It is empty unless dcfgen
-            reads the file directly.
-        defaults: section that cogen merges into all nodes, or None if the file has none.
+        hidden: file and line of each top-level key that begins with a dot, by key. It is empty for
+            a file in the layout of cogen, because dcfgen does not read this file directly.
+        defaults: section whose keys cogen copies to all nodes, or None if the file has none.
     """
 
     options: BusFileSection | None
@@ -36,10 +36,11 @@ class Layout(NamedTuple):
 
 
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
-    """Find the sections of a file.
+    """Find the sections of options, master and slaves in a bus.yml.
 
-    A key that begins with a dot is not a node. The value of such a key only defines anchors. As in
-    cogen, `defaults` override the keys of a node, and all keys are sorted.
+    A top-level key that begins with a dot is not a node, because its value only defines YAML
+    anchors. In the layout of cogen, the keys in `defaults` override the keys of each node, and all
+    keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)

@@ -31,14 +31,14 @@ class BusFileNotes:
         self._found: dict[tuple[str, FilePlace, str], RuleFinding] = {}
 
     def note(self, rule: str, place: FilePlace, where: str, text: str) -> None:
-        """Record a finding. A finding that several nodes have in the same line is recorded once.
+        """Add an error or a warning. An equal finding of other nodes in the same line is ignored.
 
         Args:
-            rule: name of the rule.
-            place: line of the finding.
-            where: section and keys, such as `joint_1.tpdo.1`, or an empty text for the file as a
-                whole.
-            text: value in the file, and the allowed values.
+            rule: name of the violated rule.
+            place: file and line of the finding.
+            where: path of keys to the value, such as `joint_1.tpdo.1`, or an empty text for the
+                whole file.
+            text: invalid value, and the allowed values.
         """
         found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
         self._found.setdefault((rule, place, text), found)
@@ -53,7 +53,10 @@ class BusFileNotes:
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
-        """All findings in line order, except those that follow from another one in their line."""
+        """All errors and warnings in the order of their lines.
+
+        An error is left out if it only follows from an unknown key in the same line.
+        """
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}
         told = (
@@ -65,13 +68,14 @@ class BusFileNotes:
 
 
 class BusFileSection:
-    """A mapping of the file, read as dcfgen reads it.
+    """A section of a bus.yml, whose methods read values and report invalid ones, as dcfgen would.
 
     Args:
         notes: collector of the findings.
-        name: section and keys, as shown to the user.
-        item: mapping to read. Any other value is reported and counts as an empty mapping.
-        place: file and line of the mapping's key.
+        name: path of keys to the section, as shown to the user.
+        item: YAML mapping with the values. A value that is not a mapping is reported, and counts as
+            an empty mapping.
+        place: file and line of the key that the section belongs to.
     """
 
     def __init__(self, notes: BusFileNotes, name: str, item: Item, place: FilePlace) -> None:
@@ -91,7 +95,7 @@ class BusFileSection:
         return key in self.fields
 
     def place_of(self, key: Key) -> FilePlace:
-        """Return the file and line of a key, or those of the section if the key is missing."""
+        """Return the file and line of a key. For a missing key, return those of the section."""
         return self._item.keys.get(key, self.place)
 
     def note(self, rule: str, key: Key, text: str) -> None:
@@ -103,7 +107,7 @@ class BusFileSection:
         self.note(rule, key, f"{shorten(str(key))}: {reason}")
 
     def section(self, key: Key) -> BusFileSection:
-        """Return a mapping of the section, or an empty one if the key is missing."""
+        """Return the nested section of a key. If the key is missing, the section is empty."""
         place = self.place_of(key)
         item = self.fields.get(key, Item({}, place))
         return BusFileSection(self.notes, f"{self.name}.{key}", item, place)
@@ -119,7 +123,7 @@ class BusFileSection:
         return [BusFileSection(self.notes, name, each, each.place) for each in item.items]
 
     def whole(self, key: Key, default: int = 0, low: int = 0, high: int = UNSIGNED32) -> int:
-        """Return a whole number, or the default if the key is missing or the value is wrong."""
+        """Return the integer of a key, or the default if the key is missing or invalid."""
         item = self.fields.get(key)
         if item is None:
             return default

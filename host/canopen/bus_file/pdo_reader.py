@@ -57,24 +57,25 @@ _MAPPED: Final = ("index", "sub_index", "bits")
 
 
 class PdoReader:
-    """Reader for the sections `rpdo` and `tpdo` of one node.
+    """Reader for the PDO settings of one slave, which are in the sections `rpdo` and `tpdo`.
 
     Args:
-        node: section of the node.
-        sheet: EDS of the node.
-        writes: collector of the writes.
-        cob_ids: free COB-IDs of the whole bus.
+        node: section of the slave in the bus.yml.
+        sheet: EDS or DCF of the slave.
+        writes: collector of the SDO writes that configure the slave.
+        cob_ids: source of the COB-IDs that `auto` gives to PDOs beyond the fourth, shared by all
+            nodes of the bus.
     """
 
     def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
         self._node, self._sheet, self._writes, self._cob_ids = node, sheet, writes, cob_ids
 
     def read(self, key: str, first: int) -> tuple[BusPdo, ...]:
-        """Read one of the two sections.
+        """Read the RPDOs or the TPDOs of the slave, and collect the writes that configure them.
 
         Args:
-            key: name of the section, `rpdo` or `tpdo`.
-            first: index of the communication parameter of the first PDO.
+            key: section to read, `rpdo` or `tpdo`.
+            first: index of the communication parameter of PDO 1.
 
         Returns:
             The PDOs that enter the master's dictionary.

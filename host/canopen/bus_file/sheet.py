@@ -29,13 +29,13 @@ _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
 
 class Sheet:
-    """A data sheet with the power-on values of one node.
+    """The EDS or DCF of one node, with methods that return the power-on values of its objects.
 
     Args:
-        path: path of the file.
-        file: sections of the file.
+        path: path of the EDS or DCF.
+        file: parsed sections of the file.
         device: device that the sections describe.
-        node_id: node-ID of the node, or 0 to use the node-ID in the file.
+        node_id: node-ID of the node. 0 stands for the node-ID in the file.
     """
 
     def __init__(self, path: Path, file: EdsFile, device: EdsDevice, node_id: int) -> None:
@@ -50,14 +50,16 @@ class Sheet:
         return index in self._rows
 
     def pdos(self, first: int) -> list[int]:
-        """Return the indices of the communication parameters that exist, sorted.
+        """Return the indices of the PDO communication parameters in the EDS, sorted.
 
-        `first` is the index of the parameter of PDO 1.
+        Args:
+            first: index of the communication parameter of PDO 1, 1400h for RPDOs or 1800h for
+                TPDOs.
         """
         return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
-        """Return the entries of an object by sub-index; empty if the object does not exist."""
+        """Return the entries of an object by sub-index; empty if the EDS lacks the object."""
         return self._rows.get(index, {})
 
     def row(self, index: int, sub: int) -> EntryDescription | None:
@@ -65,7 +67,7 @@ class Sheet:
         return self._rows.get(index, {}).get(sub)
 
     def value(self, index: int, sub: int, default: int = 0) -> int:
-        """Return the power-on value of a number, or the default if the entry does not exist."""
+        """Return the power-on value of an integer entry, or the default if there is none."""
         row = self.row(index, sub)
         if row is None or not row.data_type.is_integer:
             return default
@@ -73,7 +75,10 @@ class Sheet:
         return int.from_bytes(data, "little", signed=row.signed)
 
     def beside(self, index: int) -> str:
-        """Return the line that describes an object, or a text that the file lacks the object."""
+        """Return the EDS file and line of an object, or a text that the EDS lacks the object.
+
+        Error messages contain this text.
+        """
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
     def place(self, index: int, sub: int | None = None) -> FilePlace:
@@ -97,20 +102,22 @@ class Sheet:
 
 
 class Sheets:
-    """Reader that finds the EDS and DCF files of a bus.
+    """Finder of the EDS or DCF file of each node in a bus.yml.
 
     Args:
-        folder: folder of the bus.yml.
-        dcf_path: `dcf_path` of the options, used for nodes without a `dcf_path` of their own.
+        folder: folder that contains the bus.yml.
+        dcf_path: `dcf_path` in the options of the bus.yml, for nodes without a `dcf_path` of their
+            own.
     """
 
     def __init__(self, folder: Path, dcf_path: str) -> None:
         self._folder, self._dcf_path = folder, dcf_path
 
     def find(self, node: BusFileSection) -> Sheet | None:
-        """Return the sheet of a node. Record a finding and return None if the node has no sheet.
+        """Find and read the EDS or DCF of a node.
 
-        The file is searched in this order:
+        If there is no such file, a finding is reported and the result is None. The file is searched
+        in this order:
 
         - in the folder of the bus.yml, as in dcfgen
         - in `dcf_path`
@@ -197,12 +204,12 @@ _ODD_SIZES: Final = (3, 5, 6, 7)
 
 
 class Writes:
-    """Collector of the writes to one slave.
+    """Collector of the SDO writes with which the master configures one slave at boot-up.
 
     Args:
         sheet: EDS or DCF of the slave.
-        name: name of the slave's section.
-        notes: collector of the contradictions to the EDS.
+        name: name of the slave's section in the bus.yml.
+        notes: collector of the findings, which receives each write that contradicts the EDS.
     """
 
     def __init__(self, sheet: Sheet, name: str, notes: BusFileNotes) -> None:
@@ -215,14 +222,14 @@ class Writes:
         return tuple(self._all)
 
     def add(self, index: int, sub: int, value: int, place: FilePlace, said: str = "") -> None:
-        """Add a write. Report and omit a write that dcfgen refuses.
+        """Add an SDO write. If dcfgen would refuse the write, report it instead of adding it.
 
         Args:
             index: index of the object.
             sub: sub-index of the object.
-            value: value in the file.
-            place: the line of the file that requires the write.
-            said: text of the value on that line.
+            value: value that the bus.yml gives.
+            place: file and line of the bus.yml that requires the write.
+            said: value as written in that line.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)

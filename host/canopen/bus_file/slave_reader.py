@@ -23,14 +23,14 @@ _WRITE: Final = ("index", "sub_index", "value")
 
 
 class SlaveReader:
-    """Reader for one node.
+    """Reader that makes one slave from its section in the bus.yml and its EDS.
 
     Args:
-        name: name of the node's section.
-        node: section of the node.
+        name: name of the slave's section.
+        node: section of the slave.
         sheet: EDS or DCF of the node.
-        options: options of the file.
-        cob_ids: free COB-IDs of the whole bus.
+        options: options of the bus.yml, used for settings that the slave lacks.
+        cob_ids: source of the COB-IDs that `auto` gives to PDOs, shared by all nodes of the bus.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class SlaveReader:
         self.writes = Writes(sheet, node.name, node.notes)
 
     def read(self) -> BusSlave:
-        """Read the node and its PDOs. `writes` receives the writes in the order of dcfgen."""
+        """Return the slave with its PDOs. Collect its SDO writes in `writes`, in dcfgen's order."""
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()

@@ -25,12 +25,15 @@ _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
 
 
 def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
-    """Return the values that a DCF configures: the ParameterValues of its writable objects.
+    """Return the values to which a DCF configures a node, by index and sub-index.
+
+    These are the keys ParameterValue of the objects that can be written.
 
     Args:
         file: sections of the DCF.
         device: device that the DCF describes.
-        node_id: node-ID, which is added to values that are relative to the node-ID.
+        node_id: node-ID of the node. It is added to values that the DCF gives relative to the
+            node-ID.
     """
     sections = {(index, sub or 0): section for section, index, sub in file.objects()}
     return {
@@ -47,7 +50,7 @@ def _has_value(file: EdsFile, sections: Mapping[_Address, str], row: EntryDescri
 
 
 def is_parameter(row: EntryDescription) -> bool:
-    """Return whether an entry is a setting, and not a value of the running process."""
+    """Return whether a dictionary entry is a setting, not process data or a command."""
     mapped = Access.RPDO in row.access or Access.TPDO in row.access
     kept = row.readable and row.writable and not mapped
     return kept and row.index not in _COMMANDS and row.data_type is not DataType.DOMAIN
@@ -61,7 +64,12 @@ def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
 
 
 def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
-    """Return the PDO that is disabled by the writes so far and enabled by a remaining write."""
+    """Return a text about each PDO that stays disabled if the writing of a configuration stops now.
+
+    Args:
+        done: writes that have been executed. One of them disabled the PDO.
+        left: writes that have not been executed. One of them would enable the PDO again.
+    """
     was = {at: data for at, data in done if at[1] == _COB_ID and at[0] in PDOS}
     will = {at: data for at, data in left if at[1] == _COB_ID and at[0] in PDOS}
     open_pdos = [at for at in was.keys() & will if _is_off(was[at]) and not _is_off(will[at])]
@@ -77,12 +85,15 @@ def writes(
     number: Callable[[_Address], int],
     writable: Collection[_Address],
 ) -> list[Write]:
-    """Return the writes in order. The date of the configuration is written last.
+    """Return the SDO writes that configure a node, in an order that CiA 301 allows.
+
+    The date of the configuration (1020h) is written last.
 
     Args:
-        values: wanted values of the node.
+        values: wanted value of each object, by index and sub-index.
         number: function that reads an object of the node as an unsigned number.
-        writable: objects that can be written. Intermediate writes to other objects are left out.
+        writable: objects that the node lets the host write. Temporary writes, such as disabling a
+            PDO, are left out for other objects.
 
     Raises:
         ValueError: a COB-ID or a number of mapped objects is invalid.

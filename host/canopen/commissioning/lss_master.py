@@ -50,11 +50,11 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused or did not answer, or several slaves answered a request to one slave.
+    """An LSS command failed: a slave refused it, none answered, or more than one answered.
 
     Attributes:
-        command: command that failed, or None if several commands failed.
-        code: error code of the slave, or 0 if no slave refused.
+        command: command that failed, or None if the failure is not due to a single command.
+        code: error code that the slave sent, or 0 if no slave refused.
     """
 
     def __init__(self, message: str, command: LssCommand | None = None, code: int = 0) -> None:
@@ -63,15 +63,19 @@ class LssFailed(Exception):  # noqa: N818 - what the slave did
 
 
 class LssMaster:
-    """The LSS master of a bus. A bus may have only one LSS master.
+    """LSS master that sets the node-ID and bit rate of slaves over the bus (CiA 305).
+
+    Only one LSS master may be active on a bus.
 
     Args:
-        bus: bus with the slaves.
-        answer_us: time to wait for the answer to a command.
-        scan_us: time to wait for answers to each of the 133 requests of a fastscan.
+        bus: bus to which the slaves are connected.
+        answer_us: time to wait for the answer to a command, in microseconds.
+        scan_us: time to wait for answers to each of the 133 requests of a fastscan, in
+            microseconds.
 
     Attributes:
-        waiting: whether all slaves have returned to the state waiting at the end of `at_work`.
+        waiting: whether all slaves have been switched back to the LSS state waiting at the end of
+            the block of `at_work`.
     """
 
     def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:
@@ -80,7 +84,10 @@ class LssMaster:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Put all slaves into the state waiting before and after the block, also after errors."""
+        """Switch all slaves to the LSS state waiting, before and after the `with` block.
+
+        The slaves are also switched if the block raises an error.
+        """
         self.switch_all(LssMode.WAITING)
         try:
             yield
@@ -104,15 +111,15 @@ class LssMaster:
         return LssCommand.SWITCHED in (answer[0] for answer in answers)
 
     def fastscan(self) -> LssAddress | None:
-        """Switch a slave without a node-ID to configuration.
+        """Find a slave without a node-ID, and switch it to the LSS state configuration.
 
-        Return its address, or None if there is none.
+        Return the LSS address of this slave, or None if every slave has a node-ID.
 
-        If answers arrive too late for their questions, the scan starts again with twice the wait
-        time.
+        If answers of slaves arrive after the time-out of their request, the scan starts again with
+        twice the time-out.
 
         Raises:
-            LssFailed: the answers of the slaves match no address in any scan.
+            LssFailed: in each scan, the answers of the slaves fit no LSS address.
         """
         failed: LssFailed | None = None
         for factor in _PATIENCE:
@@ -146,9 +153,10 @@ class LssMaster:
         return LssAddress(*found)
 
     def address(self) -> LssAddress:
-        """Return the address of the only slave in configuration.
+        """Return the LSS address of the slave in the LSS state configuration.
 
-        The errors are those of `configure_node_id`.
+        Only one slave may be in this state. The method raises the same errors as
+        `configure_node_id`.
         """
         inquiries = range(LssCommand.INQUIRE_VENDOR, LssCommand.INQUIRE_SERIAL + 1)
         answers = [self._command(message(LssCommand(inquiry))) for inquiry in inquiries]
@@ -159,35 +167,42 @@ class LssMaster:
         return self._command(message(LssCommand.INQUIRE_NODE_ID))[1]
 
     def count(self) -> int:
-        """Return how many slaves in configuration answer, or 0 if no slave supports the request.
+        """Return how many slaves in the LSS state configuration answer a node-ID request.
 
-        A fastscan finds slaves with the same address as one slave. If these slaves answer at the
-        same moment, their answers are one frame on the bus and count as one answer.
+        This shows whether a fastscan has found several slaves with the same LSS address. If such
+        slaves answer at the same moment, their answers are one frame on the bus and count as one.
+        If no slave supports the request, the result is 0.
         """
         return len(self._answers_to(message(LssCommand.INQUIRE_NODE_ID)))
 
     def configure_node_id(self, node_id: int) -> None:
-        """Set the node-ID of the slave in configuration.
+        """Set the node-ID of the slave that is in the LSS state configuration.
 
         Args:
-            node_id: new node-ID, 1..127, or 255 for none.
+            node_id: new node-ID, 1..127, or 255 to remove the node-ID.
 
         Raises:
             LssFailed: the slave refuses or does not answer, or several slaves answer.
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         self._configure(message(LssCommand.CONFIGURE_NODE_ID, node_id))
 
     def configure_bit_rate(self, bit_rate: int) -> None:
-        """Set the bit rate in bit/s, one of `INDICES`.
+        """Set the bit rate of the slave that is in the LSS state configuration.
 
-        The errors are those of `configure_node_id`.
+        Args:
+            bit_rate: bit rate in bit/s, one of `INDICES`.
+
+        The method raises the same errors as `configure_node_id`.
         """
         number = STANDARD_TABLE | INDICES[bit_rate] << 8
         self._configure(message(LssCommand.CONFIGURE_BIT_TIMING, number))
 
     def activate_bit_rate(self, delay_ms: int) -> None:
-        """Switch the bit rate of all slaves in configuration after a delay, without an answer."""
+        """Make all slaves in the LSS state configuration switch to the new bit rate after a delay.
+
+        The slaves do not answer this command.
+        """
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.ACTIVATE_BIT_TIMING, delay_ms))
 
     def store(self) -> None:

@@ -26,16 +26,18 @@ _ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 1
 
 
 class NodeBus:
-    """SDO, NMT and single frames on a bus, used from one thread.
+    """A CAN bus on which commissioning tools send SDO requests, NMT commands and single frames.
 
-    If you interrupt an SDO transfer, for example by Ctrl-C, the transfer is aborted.
+    The requests run one after the other, in one thread. If a call is interrupted during an SDO
+    transfer, for example by Ctrl-C, the transfer is aborted.
 
     Args:
         link: connection to the bus.
-        timeout_us: time to wait for an SDO response.
+        timeout_us: time to wait for an SDO response, in microseconds.
 
     Attributes:
-        states: last reported NMT state by node-ID. A boot-up counts as a report.
+        states: last NMT state that each node has reported, by node-ID. A boot-up message also
+            counts.
     """
 
     def __init__(self, link: StampedLink, timeout_us: int = SDO_TIMEOUT_US) -> None:
@@ -53,10 +55,10 @@ class NodeBus:
         self._link.send((data_frame(can_id, data),))
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame. Return a time, and all frames that had arrived by that time.
+        """Wait for the next frames. Return the time, and all frames that have arrived by then.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         now_us, frames = self._link.receive_stamped(max(0, until_us - self._link.now_us))
         for _, frame in frames:
@@ -81,7 +83,11 @@ class NodeBus:
     def await_state(
         self, node_id: int, wanted: tuple[NmtState, ...], within_us: int
     ) -> NmtState | None:
-        """Wait until a node reports one of the given states. Return the last reported state."""
+        """Wait until a node reports one of the wanted NMT states, or until the time limit.
+
+        Return the last NMT state that the node reported since the call, or None if it reported
+        none.
+        """
         until_us, now_us = self.now_us + within_us, self.now_us
         self.states.pop(node_id, None)
         while self.states.get(node_id) not in wanted and now_us < until_us:
@@ -89,15 +95,15 @@ class NodeBus:
         return self.states.get(node_id)
 
     def run(self, node_id: int, script: Script[T], timeout_us: int = 0) -> T:
-        """Run a script, and return its result or raise its error.
+        """Run a script of SDO requests with a node. Return its result, or raise its error.
 
         Args:
-            node_id: node-ID of the node that the script communicates with.
+            node_id: node-ID of the node to which the script sends its requests.
             script: script to run.
-            timeout_us: time to wait for a response, or 0 for the default.
+            timeout_us: time to wait for each response. A value below the default has no effect.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         if node_id not in self._sessions:
             self._sessions[node_id] = NodeSession(node_id, self.send, self._guard)
@@ -111,7 +117,7 @@ class NodeBus:
             raise
 
     def read(self, node_id: int, index: int, sub: int, size: int = 0) -> bytes:
-        """Read an object with an SDO upload.
+        """Read an object of a node with an SDO upload, and return its bytes.
 
         Args:
             node_id: node-ID of the node.
@@ -120,8 +126,8 @@ class NodeBus:
             size: size of the object in bytes, or 0 if the size is unknown.
 
         Raises:
-            SdoFailed: the node refuses or does not answer.
-            LinkClosed: the bus is gone.
+            SdoFailed: the node refuses the request, or does not answer.
+            LinkClosed: the connection to the bus is lost.
         """
         return self.run(node_id, upload(index, sub, size))
 
@@ -148,16 +154,16 @@ _GAP_US: Final = 10_000
 
 @dataclass(frozen=True, slots=True)
 class NodeFound:
-    """A node that answered or sent a frame.
+    """A node that a network scan has found, with its identity.
 
     Attributes:
         node_id: node-ID of the node, 1..127.
-        device_type: device type (object 1000h), or None if the node did not answer.
+        device_type: device type (object 1000h), or None if the node did not answer the request.
         identity: values of the identity object 1018h by sub-index, 1 to 4. A sub-index that the
             node does not have is left out.
         name: device name (object 1008h), empty if the node has none.
-        state: last reported NMT state, or None if the node reported none.
-        answers: number of answers to one request. 2 means that two nodes share this node-ID.
+        state: last NMT state that the node has reported, or None if it has reported none.
+        answers: number of answers to one SDO request. 2 means that two nodes share this node-ID.
         heartbeat_ms: producer heartbeat time (object 1017h), or None if the node has none.
     """
 
@@ -172,14 +178,16 @@ class NodeFound:
 
 @dataclass(slots=True)
 class NetworkScan:
-    """A scan that queries all node-IDs and returns the nodes. The scan changes nothing on the bus.
+    """Scan that sends an SDO request to each node-ID 1..127 to find the nodes of a bus.
+
+    The scan changes nothing on the nodes.
 
     Args:
         bus: bus to scan.
-        wait_us: time to wait for the last answers and for heartbeats.
+        wait_us: time to wait for the last answers and for heartbeats, in microseconds.
 
     Attributes:
-        unconfigured: whether LSS slaves without a node-ID answered.
+        unconfigured: whether an LSS slave without a node-ID has answered.
     """
 
     bus: NodeBus
@@ -189,9 +197,10 @@ class NetworkScan:
     _types: dict[int, int] = field(default_factory=dict)
 
     def run(self) -> list[NodeFound]:
-        """Return the nodes that answered or sent a frame, by node-ID.
+        """Scan the bus. Return the nodes that answered or sent a heartbeat or boot-up, by node-ID.
 
-        Raise LinkClosed without a bus.
+        Raises:
+            LinkClosed: the connection to the bus is lost.
         """
         for first in range(1, 128, _AT_ONCE):
             for node_id in _NODE_IDS[first - 1 : first - 1 + _AT_ONCE]:

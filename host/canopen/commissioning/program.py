@@ -27,20 +27,21 @@ _OnProgress = Callable[[int], object]
 
 
 def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress) -> Script[None]:
-    """Write an object in blocks, with CRC if the server supports it.
+    """Write an object with an SDO block download, with CRC if the server supports it.
 
-    If a segment within a block is lost, this segment and the segments after it are sent again. If
-    the last segment of a block or its acknowledgement is lost, the transfer times out, because CiA
-    301 defines no way to continue.
+    If a segment within a block is lost, this segment and the ones after it are sent again. If the
+    last segment of a block or its acknowledgement is lost, the transfer times out, because CiA 301
+    defines no way to continue.
 
     Args:
         index: index of the object.
         sub: sub-index of the object.
         data: bytes to write.
-        on_progress: function that is called with the number of acknowledged bytes.
+        on_progress: function that is called with the number of bytes that the server has
+            acknowledged.
 
     Raises:
-        SdoAborted: the server refuses, or sends an unexpected answer. The code is
+        SdoAborted: the server refuses the transfer, or sends an unexpected answer. The code is
             `COMMAND_SPECIFIER` if the server does not support block transfer.
         SdoTimeout: the server does not answer.
     """
@@ -138,10 +139,10 @@ class ProgramFailed(Exception):  # noqa: N818 - what the node did
 
 @dataclass(frozen=True, slots=True)
 class ProgramStatus:
-    """The status of a program, as a node reports it.
+    """Status of one program (firmware) of a node, read from the node.
 
     Attributes:
-        control: value of program control (object 1F51h).
+        control: value of program control (object 1F51h), such as 1 for a running program.
         identification: program identification (object 1F56h), or None if the node has none.
         flash: flash status (object 1F57h), or None if the node has none.
     """
@@ -159,20 +160,24 @@ class ProgramStatus:
 
 
 class Program:
-    """A program of a node.
+    """One program (firmware) of a node, which a host replaces over the bus (CiA 302-3).
 
     Args:
         bus: bus of the node.
         node_id: node-ID of the node.
-        number: number of the program, 1..254, which is the sub-index of its objects.
-        say: function that is called with a description of each step.
+        number: number of the program, 1..254. It is the sub-index in the objects 1F50h to 1F57h.
+        say: function that is called with a text about each step.
     """
 
     def __init__(self, bus: NodeBus, node_id: int, number: int, say: _Say) -> None:
         self._bus, self._node_id, self._number, self._say = bus, node_id, number, say
 
     def status(self) -> ProgramStatus:
-        """Read the status of the program. Raise SdoFailed if the node has no object 1F51h."""
+        """Read the status of the program from the node.
+
+        Raises:
+            SdoFailed: the node does not answer, or has no program control (object 1F51h).
+        """
         control = self._read(boot_slave.CONTROL)
         return ProgramStatus(
             control,
@@ -181,12 +186,13 @@ class Program:
         )
 
     def command(self, command: int) -> None:
-        """Write a command to program control.
+        """Write a command, such as stop or start, to program control (object 1F51h).
 
-        A node that stops or starts its program may reset before it answers.
+        A missing answer is no error for commands that stop or start the program, because the node
+        may reset before it answers.
 
         Raises:
-            SdoAborted: the node refuses.
+            SdoAborted: the node refuses the command.
         """
         try:
             self._write(boot_slave.CONTROL, bytes((command,)))
@@ -216,20 +222,21 @@ class Program:
         self._say("started")
 
     def download(self, data: bytes, on_progress: _OnProgress, tries: int = 3) -> int:
-        """Write the program, and wait until the flash is written.
+        """Transfer a program to the node, and wait until the node has written its flash memory.
 
         Args:
             data: bytes of the program.
-            on_progress: function that is called with the number of acknowledged bytes.
-            tries: number of attempts. A disturbed transfer starts from the beginning, because a
+            on_progress: function that is called with the number of bytes that the node has
+                acknowledged.
+            tries: maximum number of attempts. Each attempt starts from the beginning, because a
                 client cannot resume a transfer (CiA 301).
 
         Returns:
             The number of attempts.
 
         Raises:
-            SdoFailed: the node refuses, or the last attempt failed.
-            ProgramFailed: the flash could not be written.
+            SdoFailed: the node refuses the program, or the last attempt failed.
+            ProgramFailed: the node reports that it could not write its flash memory.
         """
         for number in range(1, tries + 1):
             try:
@@ -268,7 +275,10 @@ class Program:
             on_progress(len(data))
 
     def await_control(self, wanted: int) -> None:
-        """Wait until program control has this value. A node does not answer during a reset."""
+        """Wait until program control (1F51h) has the wanted value.
+
+        Missing answers are ignored, because a node does not answer during a reset.
+        """
         until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
