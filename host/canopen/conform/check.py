@@ -33,9 +33,9 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Expect:
-    """Step that waits for the next frame with a CAN-ID.
+    """Step that waits for a frame of the node, which must match one of the patterns.
 
-    The frame must match one of the patterns.
+    The next frame with the CAN-ID of the patterns is compared, and other frames are ignored.
     """
 
     patterns: tuple[str, ...]
@@ -85,12 +85,12 @@ class Forget:
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """Step that operates an input of the device, compares an output, or switches the power.
+    """Step that calls the stimulus to set an input, compare an output, or switch the power.
 
     Attributes:
         words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
-        within_ms: time limit of the action, or None for any time. If the action takes longer, the
-            check is inconclusive.
+        within_ms: time limit of the stimulus in milliseconds, or None for no limit. If it takes
+            longer, the check is inconclusive.
     """
 
     words: tuple[str, ...]
@@ -99,10 +99,11 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Macro:
-    """Step that performs an operation of many frames.
+    """Step that runs a macro, an operation that needs many frames, such as an LSS fastscan.
 
     Attributes:
-        words: texts, and also addresses of objects once the check is bound.
+        words: arguments of the macro. Once names are replaced, they also include addresses of
+            objects.
     """
 
     name: str
@@ -111,11 +112,11 @@ class Macro:
 
 @dataclass(frozen=True, slots=True)
 class OfObject:
-    """A step about one object.
+    """Base class of the steps that read or write one object of the node.
 
     Attributes:
-        at: object as a name or as `1017:00`. Once the step is bound, it is an index and a
-            sub-index.
+        at: object, as a name or as text such as `1017:00`. Once names are replaced, it is an index
+            and a sub-index.
     """
 
     at: str | Address
@@ -136,10 +137,7 @@ class Write(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseWrite(OfObject):
-    """Step that writes an object.
-
-    The node must refuse the value with one of the SDO abort codes.
-    """
+    """Step that writes a value which the node must refuse with one of the given SDO abort codes."""
 
     data: str
     codes: tuple[str, ...]
@@ -161,26 +159,29 @@ class ReadOther(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRead(OfObject):
-    """Step that reads an object. The node must refuse with one of the SDO abort codes."""
+    """Step that reads an object. The node must refuse this with one of the SDO abort codes."""
 
     codes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Keep(OfObject):
-    """Step that marks an object as changed by other means. The object is restored at the end."""
+    """Step that declares an object which the check changes indirectly.
+
+    The declared object is restored at the end of the check.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class Hold(OfObject):
-    """Step that reads an object. The object must have a value of its data type.
+    """Step that reads an object, and checks that its value has the right data type and range.
 
     Attributes:
-        kind: name of the data type.
-        low: lowest value of the object, or None for the lowest value of the type.
-        high: highest value of the object, or None for the highest value of the type.
-        value: value in hex, or None for any value.
-        codes: SDO abort codes with which the node may refuse the read instead.
+        kind: name of the data type that the value must have.
+        low: lowest allowed value, or None for the lowest value of the type.
+        high: highest allowed value, or None for the highest value of the type.
+        value: only allowed value in hex, or None for any value.
+        codes: SDO abort codes with which the node may refuse to give the value.
     """
 
     kind: str
@@ -192,9 +193,9 @@ class Hold(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRewrite(OfObject):
-    """Step that reads an object and writes it back, longer by `grow` bytes.
+    """Step that reads an object and writes its value back, with `grow` more bytes.
 
-    The node must refuse.
+    The node must refuse this value, because it is too long, with one of the given SDO abort codes.
     """
 
     grow: int
@@ -207,12 +208,13 @@ Action = _OfFrames | _OfAnObject
 
 
 class Step(NamedTuple):
-    """One step of a check.
+    """One step of a conformance check: an action, and when and how it counts.
 
     Attributes:
-        action: the action of the step.
-        given: whether the step is a preparation. If a preparation fails, the check is inconclusive.
-        at_end: whether the step is always done at the end. Such a step cannot fail the check.
+        action: action of the step, such as sending a frame or waiting for one.
+        given: whether the step only prepares the check. If it fails, the check is inconclusive.
+        at_end: whether the step is a clean-up, which is always executed at the end and cannot fail
+            the check.
     """
 
     action: Action
@@ -221,7 +223,7 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """The actions that a run may do to the node. Each level includes the levels before it."""
+    """How much a run may change the node under test. Each level includes the levels before it."""
 
     READ_ONLY = 0
     """SDO uploads and listening.
@@ -248,18 +250,21 @@ STIMULUS: Final = "stimulus"
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One conformance check of a node.
+    """One conformance check of a CANopen node: its requirement, its conditions and its steps.
 
     Attributes:
         id: name of the check, such as `NMT-03`, or `OD-2000.00-type` for checks of an object of the
             EDS.
         group: group of the check, such as `NMT`.
-        title: sentence that states what a conforming node does.
-        source: document, version and clause, or `practice` if no clause is certain.
-        level: the lowest level that the check needs.
-        needs: features without which the check is not applicable. `STIMULUS` is one of them.
-        choice: reason why the device may choose the answer, empty if the clause decides.
-        steps: steps that send, expect, count or wait.
+        title: requirement, as a sentence about what a conforming node does.
+        source: document, version and clause of the requirement, or `practice` if no clause is
+            certain.
+        level: lowest level of a run at which the check is executed.
+        needs: features that the node must have. Otherwise the check is not applicable. `STIMULUS`
+            stands for a stimulus of the user.
+        choice: reason why a device may answer in several ways, empty if the clause decides the
+            answer.
+        steps: steps in the order of execution.
     """
 
     id: str
@@ -321,7 +326,7 @@ class ConformancePlan:
     shared_host: bool = False
 
     def chooses(self, check: Check) -> bool:
-        """Return whether a check is selected by its level, and by its name or group."""
+        """Return whether the run executes a check, by its level and by the patterns of `--only`."""
         if check.level > self.level:
             return False
         named = (check.id.upper(), check.group)
@@ -330,12 +335,15 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Return whether a check of a group may be selected, before the check is made.
+        """Return whether the patterns of `--only` can match a check, before the check is built.
+
+        This saves reading the files of groups, and building checks of objects, that are not
+        selected.
 
         Args:
-            group: group of the check.
-            place: part of the check's id after the group, such as `1017.00` for checks of this
-                object.
+            group: name of the group.
+            place: beginning of the check's id after the group, such as `1017.00` for the checks of
+                this object.
         """
         begun = f"{group}-{place}".upper()
         for pattern in map(str.upper, self.only):

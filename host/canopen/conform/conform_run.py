@@ -99,15 +99,20 @@ class _StrayHeartbeat:
             self.stamps = [at_us for at_us, frame in heard if matches(self._pattern, str(frame))]
 
     def compare(self, period_ms: int | None) -> None:
-        """Compare the heartbeat with the value of 1017h, which is None if the node has no 1017h."""
+        """Record a finding if the node sends a heartbeat although object 1017h does not enable one.
+
+        Args:
+            period_ms: heartbeat time in 1017h in milliseconds, or None if the node has no 1017h.
+        """
         self._period_ms = period_ms
         if not period_ms:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Listen after the run, and report the heartbeat if it is missing.
+        """Listen again after the run for a heartbeat that 1017h does not set.
 
-        A heartbeat that is not set by 1017h cannot be switched on again.
+        The node sent this heartbeat before the run. If it is missing now, it is reported as not
+        restored, because the tester cannot switch it on again.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:
@@ -145,16 +150,16 @@ Crash = Callable[[str, list[str]], object]
 
 
 class ConformRun:
-    """A run that tests one node.
+    """A conformance test of one node, from the first request to the report.
 
     Args:
-        link: connection to the bus. No other code may read from this link.
+        link: connection to the bus, from which no other code may read during the test.
         node_id: node-ID of the node, 1..127.
-        plan: options of the run.
-        device: device that the EDS describes, or None to query the node.
-        claims: statements of the EDS besides the objects.
-        source: name of the bus, as the user entered it.
-        on_result: function that is called with each result.
+        plan: options of the run, such as level and selected checks.
+        device: device that the EDS describes, or None to find out the objects from the node.
+        claims: capabilities that only the EDS states, or None without an EDS.
+        source: name of the bus as the user entered it, for the report.
+        on_result: function that is called with the result of each check.
     """
 
     def __init__(  # noqa: PLR0913 - a run, by keyword
@@ -199,18 +204,18 @@ class ConformRun:
         """Make the running check fail, because the program of the node crashed and starts again.
 
         Args:
-            reason: error in one line.
-            where: source lines that raised the error.
+            reason: exception of the crash in one line.
+            where: lines of the traceback.
         """
         if len(self._crashes) < _MOST_CRASHES:
             self._crashes[reason] = None
         self._exchange.crash(reason, where)
 
     def run(self) -> Report:
-        """Test the node and return the report. In any case, restore what was changed.
+        """Execute all selected checks, restore the node, and return the report.
 
-        Ctrl-C ends the run with a report of the checks that have ended. A second Ctrl-C, while the
-        node is being restored, ends the restoring.
+        The node is also restored after errors and after Ctrl-C. The first Ctrl-C ends the run, and
+        the report contains the checks that have ended. A second Ctrl-C ends the restoring.
         """
         aborted = ""
         try:

@@ -117,14 +117,16 @@ def _starts(step: Step) -> bool:
 
 
 class Judge:
-    """Judge that runs checks on a node. Every check begins in the same state of the node.
+    """Judge that executes single checks and gives their verdicts.
+
+    Every check begins in the same state of the node.
 
     Args:
-        plan: options of the run.
-        exchange: bus of the node.
-        player: player that plays steps on the bus.
-        care: object that restores the node after a check.
-        permission: permission that decides which objects may be written.
+        plan: options of the run, such as its level.
+        exchange: bus with the node.
+        player: player that executes the steps of a check.
+        care: helper that restores the node after each check.
+        permission: rules that decide which objects may be written.
     """
 
     def __init__(

@@ -44,20 +44,22 @@ _NUMBERS: Final = range(9)
 
 
 class KnownState:
-    """Values of the node before the run, and values in the state in which checks begin.
+    """Values of the node's objects: those before the run, and those with which each check begins.
+
+    The two differ for example in timers, which are switched off for the checks.
 
     Args:
-        exchange: bus of the node.
-        client: client that reads and writes the node.
+        exchange: bus with the node.
+        client: SDO client that reads and writes the objects.
 
     Attributes:
-        original: values of objects before the run.
-        written: objects that may have changed and have not been verified since.
-        all_written: objects written in this run.
-        stored: objects written by checks that store parameters. A reset may bring these values
-            back.
-        unrestored: objects that could not be restored, one per line.
-        repairs: writes that restore the remaining objects, in this order.
+        original: values before the run, by object.
+        written: objects that may have changed since they were last compared.
+        all_written: objects that were written at any time in this run.
+        stored: objects written by checks that store parameters in the node. A reset may bring the
+            stored values back.
+        unrestored: texts about objects that could not be restored.
+        repairs: writes that would restore these objects, in this order.
     """
 
     def __init__(self, exchange: BusExchange, client: SdoClient) -> None:
@@ -76,11 +78,13 @@ class KnownState:
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Read objects whose values are unknown. Objects that cannot be read are not restored.
+        """Read the original values of objects that a run may change, so that they can be restored.
+
+        An object that cannot be read will not be restored.
 
         Args:
-            addresses: addresses of the objects.
-            held: values that were just read. The objects with these values are not read again.
+            addresses: index and sub-index of each object.
+            held: values that have just been read, by object. These objects are not read again.
         """
         for at in addresses:
             if at in self.original:
@@ -111,7 +115,7 @@ class KnownState:
         return self.original.get(at, b"")
 
     def is_quieted(self, at: Address) -> bool:
-        """Return whether an object has another value in checks than before the run."""
+        """Return whether an object has another value during checks than before the run."""
         return self._begin.get(at) != self.original.get(at)
 
     def write(self, addresses: Collection[Address]) -> None:
@@ -134,14 +138,14 @@ class KnownState:
         self._write_back(self._begin, [at for at in addresses if at in self._begin])
 
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
-        """Bring objects that resets changed into the state in which checks begin.
+        """Give the objects that a reset has changed the values with which each check begins.
 
         The first reset of a kind shows which objects it changes. After later resets of this kind,
         only these objects and the objects written since then are read. Reading all objects each
         time took half the processor time of a run.
 
         Args:
-            resets: kinds of the resets, empty if the kind of reset is unknown.
+            resets: kinds of the resets that happened, empty if the kind is unknown.
             written: objects that may have been written since the last reset.
         """
         touched: Iterable[Address] = self._begin
@@ -303,13 +307,13 @@ _TO_STATE: Final = {NmtState.OPERATIONAL: NmtCommand.START, NmtState.STOPPED: Nm
 
 
 class NodeCare:
-    """Care for one node during a run: recovering and restoring it.
+    """Helper that prepares the node for checks, recovers it after failures, and restores it.
 
     Args:
-        exchange: bus of the node.
-        client: client that reads and writes the node.
+        exchange: bus with the node.
+        client: SDO client that reads and writes the objects.
         node_id: node-ID of the node, 1..127.
-        level: level of the run. On READ_ONLY, the node is only read.
+        level: level of the run. On READ_ONLY, nothing is written.
 
     Attributes:
         state: values of the node before the run, and in checks.
@@ -328,11 +332,11 @@ class NodeCare:
         self._stored = self.lost = False
 
     def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Record the state of the node. Bring the node into the state in which checks begin.
+        """Record the values of the node before the run, and bring it into the state for checks.
 
         Args:
-            addresses: addresses of the objects that may change in the run.
-            held: values that were just read.
+            addresses: index and sub-index of each object that may change in the run.
+            held: values that have just been read, by object.
         """
         if self._level is Level.READ_ONLY:
             return
@@ -370,7 +374,7 @@ class NodeCare:
         return sorted(at for at in addresses - known.keys() if at[0] not in _STORAGE)
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
-        """Restore the node after a check. Return False if that fails. The node is then lost."""
+        """Restore the node after a check. Return False if this fails, because the node is lost."""
         booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
         storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
         if storing:

@@ -56,10 +56,10 @@ _ADDRESS: Final = re.compile(r"([0-9A-F]{4}):([0-9A-F]{2})")
 
 
 class Unbound(Exception):  # noqa: N818 - what the name is
-    """A name for which the tested node has no object or value.
+    """Raised if a check uses a name for which the node under test has no object or value.
 
     Attributes:
-        reason: reason in words.
+        reason: text that explains why.
     """
 
     def __init__(self, name: str, reason: str) -> None:
@@ -71,19 +71,23 @@ class _Names(Protocol):
     """The values that stand for the names in checks on one node."""
 
     def text(self, name: str, attribute: str, /) -> str:
-        """Return the value of `$name.attribute`. The attribute may be empty.
+        """Return the text that replaces `$name.attribute` in a check.
 
-        The attributes of an object are: none for its multiplexer, `new` and `other` for two allowed
-        values, `old` for the value before the run, and `map` for its mapping entry. All values are
-        in hex, in the byte order of the bus.
+        All values are in hex, in the byte order of the bus. The attributes of an object are `new`
+        and `other` for two allowed values, `old` for the value before the run, and `map` for its
+        mapping entry. An empty attribute stands for its multiplexer (index and sub-index).
 
         Raises:
-            Unbound: the node has no such object or value.
+            Unbound: the node has no object or value for this name.
         """
         ...
 
     def address(self, name: str, /) -> Address:
-        """Return index and sub-index of an object. Raise Unbound if the node has no such object."""
+        """Return the index and sub-index of the object that replaces a name in a check.
+
+        Raises:
+            Unbound: the node has no such object.
+        """
         ...
 
 
@@ -236,9 +240,10 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return a step as text, without its expected codes; empty if the step is about frames.
+    """Return the text of a step without its expected abort codes, as the head of a failure message.
 
-    The failure of such a step names the expected frames.
+    The text is empty for a step about frames, because its failure message contains the expected
+    frames.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():
@@ -327,19 +332,19 @@ _STORED: Final = "store parameters in the node, in place of those stored before"
 
 @dataclass(frozen=True, slots=True)
 class BoundCheck:
-    """A check for one node.
+    """A check in which names are replaced by objects and values of the node, ready to be executed.
 
     Attributes:
-        check: check with its names.
+        check: check with its names, as in the file.
         steps: steps with numbers. An object is given by its index and sub-index.
-        changed: objects that the check changes.
-        used: objects that the node must have.
-        written: changed objects, and objects whose writing the node must or may refuse.
-        questions: questions to the user before the check.
+        changed: objects that the steps change, so that they are restored.
+        used: objects that the node must have. Otherwise the check is not applicable.
+        written: objects that the steps write, including writes that the node may or must refuse.
+        questions: questions to which the user must answer yes before the check.
         can_ids: CAN-IDs of the frames that the check judges.
-        within_us: longest duration of the check.
-        resets: kinds of resets of the node, which change all values of the node. A kind is a frame
-            without the node-ID, or the first word of a stimulus.
+        within_us: time limit of the check in microseconds.
+        resets: kinds of resets among the steps, which change all values of the node. A kind is an
+            NMT frame without the node-ID, or the first word of a stimulus.
     """
 
     check: Check
@@ -354,7 +359,11 @@ class BoundCheck:
 
 
 def bind_check(check: Check, names: _Names) -> BoundCheck:
-    """Replace names by numbers. Raise Unbound if the node has no object or value for a name."""
+    """Replace the names in a check by objects and values of the node.
+
+    Raises:
+        Unbound: the node has no object or value for a name.
+    """
     steps = tuple(_bind_step(step, names) for step in check.steps)
     actions = [step.action for step in steps]
     request, sync = _resolve("$request", names), _resolve("$sync", names)

@@ -138,9 +138,12 @@ class _Maker:
         self._node_id, self._allow, self._never = node_id, allow, never
 
     def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[check.Check]:
-        """Make the checks of one entry.
+        """Make the checks for one entry of the object dictionary, from its EDS description.
 
-        `counts` is whether the entry is the sub-index 0 of a record.
+        Args:
+            entry: entry with its data type, access and limits.
+            counts: whether the entry is the sub-index 0 of a record, which holds its highest
+                sub-index.
         """
         if entry.readable:
             constant = self._power_on(entry) if _is_constant(entry, counts) else None

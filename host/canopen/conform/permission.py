@@ -34,15 +34,16 @@ _Confirm = Callable[[str], bool]
 
 
 class Permission:
-    """Permission that checks each frame before it is sent.
+    """Rules that decide whether a run may send a frame to the bus. Every frame is checked.
 
     Args:
         level: level of the run.
-        allow: indices of the profile area that may be written.
+        allow: indices of objects in the profile area (6000h and above) that the user allows to be
+            written.
         node_id: node-ID of the node under test.
-        confirm: function that is called once before each kind of action that concerns other nodes
-            or cannot be undone.
-        never: indices that are never written.
+        confirm: function that asks the user a question. It is called once for each kind of action
+            that concerns other nodes or cannot be undone.
+        never: indices of objects that must never be written.
 
     Attributes:
         others: node-IDs of other nodes on the bus.
@@ -64,7 +65,7 @@ class Permission:
         self._all_configured = False
 
     def check(self, frame: CanFrame) -> None:
-        """Check that a frame may be sent. Raise an error if it may not.
+        """Check that the run may send a frame.
 
         Raises:
             NotAllowed: the level does not allow the frame.
@@ -85,11 +86,14 @@ class Permission:
             self._check_lss(frame.data)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
-        """Check that an object may be written. Raise NotAllowed if it may not.
+        """Check that the run may write an object.
+
+        Raises:
+            NotAllowed: the level or the options of the run do not allow the write.
 
         Args:
-            index: index of the object.
-            refused: whether the node must refuse the write.
+            index: index of the object, 0x0000..0xFFFF.
+            refused: whether the check expects the node to refuse the write.
         """
         self._check_never(index)
         if index in PROGRAMS:
@@ -101,9 +105,12 @@ class Permission:
             raise NotAllowed(f"{index:04X}h would be written with a valid value: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
-        """Ask the user once. Raise NotAllowed if the answer is no.
+        """Check that the user agrees to an action. The user is asked once per question.
 
-        SYNC needs no confirmation if no other node is on the bus.
+        SYNC messages need no agreement if no other node is on the bus.
+
+        Raises:
+            NotAllowed: the user does not agree.
         """
         if question == SYNC_TO_ALL and not self.others:
             return

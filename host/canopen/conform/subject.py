@@ -39,11 +39,13 @@ TOLD: Final = {"device type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x
 
 
 def other_device(device: EdsDevice | None, about: Mapping[str, str]) -> str:
-    """Return how an EDS differs from the node, or an empty text if the EDS describes this device.
+    """Return how the node differs from the device in the EDS, or an empty text if they agree.
+
+    A difference means that the EDS belongs to another device.
 
     Args:
         device: device that the EDS describes, or None without an EDS. A value of 0 is not compared.
-        about: properties that the node reports.
+        about: properties that the node has reported, as texts by name.
     """
     entries = device.entries if device else ()
     values = {(one.index, one.sub): int.from_bytes(one.default, "little") for one in entries}
@@ -325,16 +327,15 @@ _READ_ONLY: Final = "06010002"
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """The node under test, as found before the first check.
+    """The node under test: what the tester has found out about it before the first check.
 
     Attributes:
-        binding: objects of the node by name.
-        features: features of the node.
-        names: the values of the names in checks.
-        about: properties that the node reports, by name, in words.
-        values: objects that can be read and written. They are found once, because this takes a
-            tenth of a run.
-        refused: the mandatory objects that the node refuses to read.
+        binding: objects of the node by the names in checks.
+        features: features that the node has.
+        names: texts and addresses that replace names in checks.
+        about: properties that the node has reported, such as its device name, as texts by name.
+        values: index and sub-index of each object that can be read and written.
+        refused: mandatory objects that the node refuses to read.
     """
 
     binding: Binding
@@ -345,9 +346,10 @@ class Subject:
     refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
-        """Return why not all objects of a check can be used, or None if all can be used.
+        """Return why a check cannot be applied because of a missing object, or None if it can.
 
-        If the node lacks a mandatory object, one check fails, and the other checks do not use it.
+        If the node lacks a mandatory object, one check fails for this reason, and the other checks
+        that need the object are not applied.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
@@ -358,9 +360,9 @@ class Subject:
         return None
 
     def fixed(self, steps: Collection[check.Step]) -> str | None:
-        """Return why not all written objects accept the value. CiA 301 allows constant objects.
+        """Return why a write step cannot change its object, or None if all write steps can.
 
-        The result is None if all written objects accept the value.
+        CiA 301 allows some objects to be constant.
         """
         for step in steps:
             for at in _takes(step):
@@ -391,9 +393,9 @@ class Subject:
         return "the node has no" if asked else "without an EDS there is no known"
 
     def restorable(self, level: check.Level) -> list[check.Address]:
-        """Return the objects that a run may change, either directly or by a reset.
+        """Return the objects that a run may change, directly by a write or indirectly by a reset.
 
-        The objects are read before the run, and written after the run.
+        The tester reads them before the run, and restores them after it.
         """
         highest = PROFILE if level is check.Level.INTRUSIVE else MANUFACTURER
         apart = {*PROGRAMS, *STORAGE}
@@ -435,7 +437,9 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     claims: EdsClaims | None,
     others: Collection[int],
 ) -> Subject:
-    """Find out the properties of a node. Nothing is written to the node.
+    """Find out what the tester must know about a node before the first check.
+
+    Nothing is written to the node.
 
     Raises:
         SdoTimeout: the node does not answer.

@@ -43,7 +43,7 @@ def _read_group(name: str) -> _Group:
 
 
 def read_suite() -> tuple[_Group, ...]:
-    """Return all groups that come with the package, in the order in which they are judged."""
+    """Return all groups of checks that tickrig contains, in the order of execution."""
     return tuple(map(_read_group, ORDER))
 
 
@@ -53,7 +53,10 @@ def suite_checks() -> list[Check]:
 
 
 def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
-    """Yield the checks of the suite that a plan selects. The files of other groups are not read."""
+    """Yield the checks that the options of a run select.
+
+    Files of groups without a selected check are not read.
+    """
     for name in ORDER:
         if plan.may_choose(name):
             yield from filter(plan.chooses, _read_group(name).checks)
@@ -61,7 +64,7 @@ def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
 
 @cache
 def group_titles() -> Mapping[str, str]:
-    """Return the topics of the groups by name. The last topic is that of object checks."""
+    """Return the title of each group of checks, by group name. The object checks come last."""
     titles = {name: _head(_text(name).split("\n", 1)[0])[2] for name in ORDER}
     return {**titles, OBJECTS: _OF_EACH_OBJECT}
 
@@ -71,10 +74,12 @@ def _text(name: str) -> str:
 
 
 def parse_group(text: str) -> _Group:
-    """Read a file of checks, which empty lines separate. A line that begins with # is a comment.
+    """Parse a file with a group of checks.
+
+    Empty lines separate the checks. A line that begins with # is a comment.
 
     Raises:
-        ValueError: a line is not in the notation. The message contains the line.
+        ValueError: a line is not in the notation of checks. The message contains the line.
     """
     blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
     match = _head(blocks[0])

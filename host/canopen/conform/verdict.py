@@ -32,13 +32,13 @@ class Direction(StrEnum):
 
 
 class FrameLine(NamedTuple):
-    """A line of the evidence: a frame on the bus, or a remark of the tester.
+    """One line of the recorded evidence of a check: a frame on the bus, or a remark of the tester.
 
     Attributes:
-        at_us: bus time since the start of the run.
-        direction: direction of the frame: to the node, or from the bus. A remark of the tester has
-            its own value.
-        text: frame in candump notation, or remark.
+        at_us: bus time since the start of the run, in microseconds.
+        direction: whether the frame was sent to the node or came from the bus, or that the line is
+            a remark.
+        text: frame in candump notation, or the text of the remark.
     """
 
     at_us: int
@@ -48,17 +48,17 @@ class FrameLine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CheckOutcome:
-    """One attempt at a check.
+    """Verdict and evidence of one attempt at a check.
 
     Attributes:
         verdict: verdict of the attempt.
-        reason: reason in one line, with the received and the allowed frames, or an empty text if
-            the check passed.
-        evidence: frames on the bus.
-        start_us: bus time of the start, since the start of the run.
-        end_us: bus time of the end, since the start of the run.
-        wanted: patterns of the expected frame, one of which must match, if the attempt failed
-            because of a frame.
+        reason: explanation of the verdict in one line, with the received and the expected frames.
+            It is empty if the check passed.
+        evidence: frames on the bus and remarks of the tester.
+        start_us: bus time at the start of the attempt, in microseconds since the start of the run.
+        end_us: bus time at the end of the attempt, in microseconds since the start of the run.
+        wanted: patterns of the frames that would have been correct, if the attempt failed because
+            of a frame.
     """
 
     verdict: CheckVerdict
@@ -71,12 +71,12 @@ class CheckOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """A check with its result.
+    """Result of one check in a run.
 
     Attributes:
         check: check that was judged.
-        outcome: attempt that counts.
-        first: attempt before `outcome`, if a failure was repeated.
+        outcome: attempt that decides the verdict.
+        first: attempt before `outcome`, or None if the check was not repeated.
     """
 
     check: Check
@@ -130,9 +130,10 @@ class Report:
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the run (conform.md 5).
+        """Exit status of `canmon conform` for this report (conform.md 5).
 
-        0: all pass, 1: a failure, 4: inconclusive or blocked, 5: nothing judged.
+        0: all checks pass, 1: a check failed, 4: a check is inconclusive or blocked, or the run
+        ended early, 5: no check was judged.
         """
         return self.exit_status_with(self.count(CheckVerdict.FAIL))
 

@@ -26,15 +26,15 @@ _COB_ID_BYTES: Final = 4
 
 
 def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write]:
-    """Yield the writes that bring objects to their values, in order.
+    """Yield the SDO writes that set objects to given values, in an order that CiA 301 allows.
 
     A PDO is disabled while its parameters change, and its mapping is emptied first. SYNC is stopped
     while its parameters change. EMCY and SDO servers are disabled while their COB-ID changes.
 
     Args:
-        values: the wanted values of the objects.
-        number: function that reads an object of the node, as an unsigned number of the object's
-            size. It returns None if the value was unknown, so that it could not be restored.
+        values: wanted value of each object, by index and sub-index.
+        number: function that reads an object of the node as an unsigned number. It returns None if
+            the value is unknown.
     """
     left = {at: value for at, value in values.items() if is_standard(at, value)}
     odd = {at: value for at, value in values.items() if at not in left}
@@ -49,12 +49,16 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 
 
 def is_standard(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects has the length that CiA 301 defines."""
+    """Return whether a value has the length that CiA 301 defines for its object.
+
+    Only COB-IDs and numbers of mapped objects have such a length. For other objects the result is
+    True.
+    """
     return len(value) == (_bytes_of(at) or len(value))
 
 
 def is_too_long(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects does not fit into its object."""
+    """Return whether a COB-ID or a number of mapped objects is too large for its object."""
     return bool((size := _bytes_of(at)) and value[size:].strip(b"\0"))
 
 

@@ -89,11 +89,11 @@ _DEVICE_TYPE: Final = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class BoundObject:
-    """The object of the node that a name in a check stands for.
+    """Object of the node under test that replaces a name such as `$u8` in a conformance check.
 
     Attributes:
-        entry: description of the object.
-        value: bytes that were read, or None if the object cannot be read.
+        entry: description of the object from the EDS, or from probing the node.
+        value: bytes that were read from the node, or None if the object cannot be read.
     """
 
     entry: EntryDescription
@@ -129,15 +129,17 @@ Bound = BoundObject | BoundPdo | BoundPlace
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """The objects that the names in `NAMES` stand for, and the reasons for names without an object.
+    """Assignment of the names in conformance checks to objects and PDOs of the node under test.
+
+    A check whose names have no object is not applicable to the node.
 
     Attributes:
-        device: objects in the EDS, or the objects that answered.
+        device: objects that the EDS describes, or without an EDS the objects that answered.
         known: whether the objects come from an EDS.
         entries: entries of the dictionary by index and sub-index.
-        reader: reader that has read the objects.
-        bound: the objects by name.
-        reasons: reasons in words for each name that is not bound, by name.
+        reader: reader that has read the objects, and caches their values.
+        bound: object or PDO of each name.
+        reasons: text for each name that has no object, which explains why.
     """
 
     device: EdsDevice

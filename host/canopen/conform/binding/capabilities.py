@@ -65,12 +65,12 @@ _DUMMIES: Final = {"dummy5": "dummy0005", "dummy6": "dummy0006"}
 
 
 class EdsClaims(NamedTuple):
-    """The statements of an EDS about a node, besides the objects.
+    """Capabilities of a node that only its EDS states, in addition to the list of objects.
 
     Attributes:
-        lss: whether the node has LSS.
-        dummies: features for dummy objects that may be mapped, from `_DUMMIES`.
-        identity: first numbers of 1018h by sub-index, from the section DeviceInfo.
+        lss: whether the node supports LSS.
+        dummies: names of the features for the dummy objects that the node allows in a PDO mapping.
+        identity: numbers of the identity object 1018h by sub-index, from the section DeviceInfo.
     """
 
     lss: bool
@@ -92,12 +92,12 @@ class EdsClaims(NamedTuple):
 
 
 class NodeDescription(NamedTuple):
-    """The description of a node before the node is queried.
+    """Description of a node under test by its EDS, before the tester sends any request to the node.
 
     Attributes:
-        device: device with the objects of the node.
-        claims: properties that the EDS states besides the objects.
-        wrong: errors and warnings in the EDS.
+        device: device with the objects that the EDS describes.
+        claims: capabilities that only the EDS states, such as LSS.
+        wrong: errors and warnings found in the EDS.
     """
 
     device: EdsDevice
@@ -114,10 +114,11 @@ class NodeDescription(NamedTuple):
     def of_table(
         cls, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
     ) -> NodeDescription:
-        """Return the description that an EDS of these objects gives, without writing the EDS.
+        """Make the description of an emulated node from its object table, without writing an EDS.
 
-        An EDS cannot express "no default". Therefore the description has the power-on value of
-        every number, and no value for an empty text.
+        The result is the same as from an EDS of these objects. An EDS cannot express that an object
+        has no default value, so the description has the power-on value of every number, and no
+        value for an empty text.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]
@@ -141,12 +142,12 @@ def _as_said(row: EntryDescription) -> EntryDescription:
 
 @dataclass(frozen=True, slots=True)
 class NodeFeatures:
-    """The capabilities of a node.
+    """Features that the node under test has or lacks, for deciding which checks are applicable.
 
     Attributes:
-        words: names of the features, as checks write them.
-        reasons: reasons in words for missing features.
-        findings: contradictions between EDS and node, one per line.
+        words: names of the features that the node has, as checks write them.
+        reasons: text for each missing feature, which explains why it counts as missing.
+        findings: texts about contradictions between the EDS and the node.
     """
 
     words: frozenset[str]
@@ -157,15 +158,15 @@ class NodeFeatures:
 def find_features(
     binding: Binding, client: SdoClient, claims: EdsClaims | None = None
 ) -> NodeFeatures:
-    """Find out the capabilities of a node. Nothing is written to the node.
+    """Find out which features the node under test has, without writing to the node.
 
-    Only the EDS shows whether the node has LSS, because a trial would change the state of all nodes
-    on the bus. Without an EDS the tester assumes that the node has no LSS.
+    Only the EDS shows whether the node supports LSS, because a trial would change the state of all
+    nodes on the bus. Without an EDS the tester assumes that the node has no LSS.
 
     Args:
-        binding: objects of the node by name.
-        client: client that tries a block upload.
-        claims: properties that the EDS states, or None without an EDS.
+        binding: objects of the node by the names in checks.
+        client: SDO client that tries a block upload.
+        claims: capabilities that the EDS states, or None without an EDS.
     """
     reasons = dict(_missing(binding))
     for word, key in _DUMMIES.items():

@@ -24,13 +24,13 @@ _BROKEN: Final = (AbortCode.TOGGLE_BIT, AbortCode.COMMAND_SPECIFIER)
 
 
 class ObjectReader:
-    """Reader that caches the values of objects.
+    """Reader for the objects of a node, which reads each object once by SDO and caches the answer.
 
     Args:
-        upload: function that reads an object.
+        upload: function that reads an object by SDO.
 
     Attributes:
-        findings: descriptions that the node contradicts, one per line.
+        findings: texts about objects that do not agree with their descriptions.
     """
 
     def __init__(self, upload: Upload) -> None:
@@ -45,10 +45,13 @@ class ObjectReader:
         return {at: value for at, value in self._known.items() if isinstance(value, bytes)}
 
     def read(self, entry: object_table.EntryDescription) -> bytes | None:
-        """Return the value of a described object, or None if it cannot be read or has another size.
+        """Read an object that the EDS describes. Return its bytes, or None if they are not usable.
+
+        They are not usable if the node refuses the request, or if the size contradicts the
+        description.
 
         Raises:
-            SdoTimeout: the node has stopped answering.
+            SdoTimeout: the node no longer answers.
         """
         new = (entry.index, entry.sub) not in self._known
         answer = self.try_read(entry.index, entry.sub)
@@ -58,19 +61,21 @@ class ObjectReader:
         return answer if isinstance(answer, bytes) and not wrong else None
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number of at most 32 bits, or None if the object has no such value.
+        """Read an object as an unsigned number of at most 32 bits. Return None if it is not one.
+
+        The result is also None if the node refuses the request.
 
         Raises:
-            SdoTimeout: the node has stopped answering.
+            SdoTimeout: the node no longer answers.
         """
         answer = self.try_read(index, sub)
         return number_of(answer) if isinstance(answer, bytes) else None
 
     def has_nothing(self, index: int, sub: int) -> bool:
-        """Return whether the node refuses to read an index and sub-index, with any abort code.
+        """Return whether the node refuses to read an index and sub-index, with any SDO abort code.
 
         Raises:
-            SdoTimeout: the node has stopped answering.
+            SdoTimeout: the node no longer answers.
         """
         return isinstance(self.try_read(index, sub), SdoAborted)
 
@@ -155,7 +160,9 @@ _MAPPED: Final = 8
 
 
 def probe_device(reader: ObjectReader) -> EdsDevice:
-    """Find out which objects of CiA 301 a node has. Other objects stay unknown.
+    """Find out by SDO uploads which communication objects (CiA 301) a node has, if there is no EDS.
+
+    Objects of the manufacturer and of device profiles are not searched.
 
     Raises:
         SdoTimeout: the node does not answer.

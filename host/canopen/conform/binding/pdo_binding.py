@@ -35,13 +35,14 @@ _CYCLIC: Final = range(1, 241)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundPdo(PdoDescription):
-    """A PDO that was found in the node.
+    """PDO of the node under test that replaces a name such as `$tpdo` in a conformance check.
 
     Attributes:
-        index: index of the communication parameter, from 1400h or from 1800h.
-        subs: sub-indices of the communication parameter.
-        remappable: whether mapping and COB-ID of the PDO may be written.
-        places: number of objects that can be mapped.
+        index: index of its communication parameter, from 1400h for an RPDO or from 1800h for a
+            TPDO.
+        subs: sub-indices that the communication parameter has.
+        remappable: whether the mapping and the COB-ID of the PDO can be written.
+        places: number of objects that the PDO can map.
         restless: whether the PDO has an inhibit time or an event timer that cannot be switched off.
     """
 
@@ -146,15 +147,18 @@ PDO_NAMES: Final = (*(kind.name for kind in (*_TPDO_KINDS, *_RPDO_KINDS)), _MAPP
 def bind_pdos(
     device: EdsDevice, reader: ObjectReader, may_write: Callable[[int], bool]
 ) -> tuple[dict[str, BoundPdo], dict[str, str]]:
-    """Find a PDO of each kind.
+    """Find one PDO of the node for each PDO name in conformance checks.
 
-    `mapped_rpdo` is an RPDO whose objects may all be written. Checks send no data to the other
-    RPDOs while these have their original mapping.
+    The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks send
+    no data to other RPDOs while these have their original mapping.
+
+    Returns:
+        The PDO of each name, and for each name without a PDO a text that explains why.
 
     Args:
         device: device that the EDS describes.
-        reader: reader for objects of the node.
-        may_write: function that returns whether an object may be written.
+        reader: reader for the objects of the node.
+        may_write: function that returns whether the run may write an object, by its index.
 
     Returns:
         The PDOs that were found, and the reasons for the missing ones, by name.

@@ -41,16 +41,16 @@ class Use(Enum):
 
 
 class EntryFacts(NamedTuple):
-    """The facts that decide which names an entry can stand for.
+    """Properties of a dictionary entry that decide which names in checks it can replace.
 
-    The facts are computed once for all names.
+    They are computed once per entry, because they are compared with the criteria of every name.
 
     Attributes:
-        entry: entry of the dictionary.
-        access: bits of the entry's access.
-        kind: number of the entry's data type.
-        free: whether the entry accepts what its description allows, without further rules of CiA
-            301.
+        entry: entry of the object dictionary.
+        access: access rights of the entry as a bit mask.
+        kind: number of the entry's data type (CiA 301).
+        free: whether all values in the entry's described range may be written. It is False for
+            communication objects for which CiA 301 has further rules.
     """
 
     entry: EntryDescription
@@ -71,18 +71,19 @@ def facts_of(entries: Iterable[EntryDescription]) -> list[EntryFacts]:
 
 
 class WantedObject(NamedTuple):
-    """A name and the objects that it can stand for.
+    """Name in conformance checks, with the criteria for the object that replaces it.
 
     Attributes:
-        name: name of the object in checks, without its `$`.
-        what: description of the object, used in messages.
-        use: use of the object in checks.
-        access: required access as a mask of bits, and the values of these bits.
-        kinds: numbers of the allowed data types, or None for any.
-        limited: whether the data type must have values beyond both limits.
+        name: name as in checks, without its `$`.
+        what: description of the object, for messages.
+        use: use of the object in checks: read, written, or written in vain.
+        access: bit mask of access rights, and the required value of these bits.
+        kinds: numbers of the allowed data types, or None for any type.
+        limited: whether the object must have a low and a high limit, with values of its data type
+            beyond both.
         at: index and sub-index that the object must have, or None. If it is set, the other criteria
             do not apply.
-        lengths: allowed lengths of the value in bytes.
+        lengths: allowed lengths of the object's value in bytes.
     """
 
     name: str
@@ -95,10 +96,10 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the entries that match, in their order.
+        """Return the entries that meet the criteria of this name, in the order of the argument.
 
-        An entry to be written accepts what its description allows, without further rules of CiA
-        301.
+        If checks write the object, communication objects with further rules of CiA 301 are left
+        out.
 
         The function is one loop without function calls, because calls took a tenth of the time of a
         single check.

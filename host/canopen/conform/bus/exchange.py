@@ -23,14 +23,14 @@ from tickrig.wire.instant import NEVER
 
 
 class StepFailed(Exception):  # noqa: N818 - what the step did
-    """The node did not react as expected.
+    """Raised if the node under test does not react as a step of a check expects.
 
-    The message gives the received frame and the allowed frames.
+    The message contains the received frame and the expected ones.
 
     Attributes:
         got: received frame in candump notation, empty if no frame was received.
-        wanted: patterns of the expected frame, one of which must match, or an empty tuple if no
-            frame was expected.
+        wanted: patterns of the frames that would have been correct, or an empty tuple if no frame
+            was expected.
     """
 
     def __init__(self, text: str, got: str = "", wanted: Iterable[str] = ()) -> None:
@@ -39,9 +39,9 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is
-    """The level of the run forbids a step.
+    """Raised if a step of a check needs more permissions than the user has given to the run.
 
-    The message gives the step and the level that allows it.
+    The message contains the step and the option that would allow it.
     """
 
 
@@ -62,11 +62,10 @@ _Line = tuple[int, Direction, CanFrame | str]
 
 
 class Evidence:
-    """The frames and remarks of one attempt at a check, as lines of text.
+    """Recorded frames and remarks of one attempt at a check, which reports show for a failure.
 
-    If there are many lines, only the first and the last ones are kept.
-
-    Frames are formatted only when the lines are read.
+    Of many lines, only the first and the last ones are kept. Frames are formatted only when the
+    lines are read.
     """
 
     def __init__(self) -> None:
@@ -179,7 +178,7 @@ class _Allowance:
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count the bits of a frame of the tester, or of an answer to such a frame."""
+        """Count a frame of the tester, or an answer of the node, as used bus load."""
         bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
         self.from_us = max(self.from_us, now_us - _WINDOW_US) + bits / self._bits_us
 
@@ -196,7 +195,10 @@ class _ForeignLoad:
         self._window = self._bits = 0
 
     def add(self, at_us: int, frame: CanFrame) -> bool:
-        """Count the bits of a frame. Return True if the bus is too loaded to judge the node."""
+        """Count the bits of a frame of another node.
+
+        Return True if such frames load the bus so much that the node under test cannot be judged.
+        """
         window = at_us // _WINDOW_US
         if window != self._window:
             self._window, self._bits = window, 0
@@ -307,12 +309,14 @@ class BusExchange:
         return self._link.now_us
 
     def begin(self, within_us: int, watched: frozenset[str] | None = None) -> None:
-        """Begin a check, or the work between two checks. Drop all earlier frames.
+        """Start to record the frames of a check, or of the work between two checks.
+
+        The record of earlier frames is dropped.
 
         Args:
-            within_us: longest duration of the check or the work.
-            watched: CAN-IDs whose frames are kept, in addition to the CAN-IDs of the node. The
-                value is None between checks, when no evidence is kept.
+            within_us: longest duration of the check or of the work, in microseconds.
+            watched: CAN-IDs whose frames are recorded, in addition to the CAN-IDs of the node under
+                test. None stands for work between two checks, which is not recorded.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
@@ -325,9 +329,9 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """Number of nodes that have answered.
+        """How many nodes with the tested node-ID have answered: none, one or two.
 
-        If most requests got two answers, two nodes have answered.
+        Two nodes share the node-ID if most SDO requests got two answers.
         """
         if self._is_silent:
             return Presence.NONE
@@ -337,7 +341,10 @@ class BusExchange:
         return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
-        """Allow the node to use any CAN-ID. From now on, only heartbeats reveal other nodes."""
+        """End the search for other nodes by their CAN-IDs, which the node under test may now use.
+
+        From now on, another node is detected only by its heartbeat.
+        """
         self._others_by = _HEARTBEATS
 
     def remark(self, text: str) -> None:
@@ -351,15 +358,21 @@ class BusExchange:
             self.remark(reason)
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
-        """Make the running check fail, because the program of the node crashed and starts again."""
+        """Make the running check fail, because the program of the node crashed and starts again.
+
+        Args:
+            reason: exception of the crash in one line.
+            where: lines of the traceback, recorded as remarks.
+        """
         self.crashes[reason] = None
         for line in (reason, *where):
             self.remark(line)
 
     def send(self, frame: CanFrame) -> None:
-        """Send a frame as soon as the load allows it.
+        """Send a frame to the bus, as soon as the allowed bus load permits.
 
-        Raise NotAllowed if the level does not allow the frame.
+        Raises:
+            NotAllowed: the level of the run does not allow the frame.
         """
         self._permit(frame)
         link, is_request = self._link, frame.can_id == self._request
@@ -392,13 +405,13 @@ class BusExchange:
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
-        """Wait for the next frame with a CAN-ID. The frame must match one of the patterns.
+        """Wait for the next frame with a CAN-ID, and return it in candump notation.
 
         Returns:
             The received frame.
 
         Raises:
-            StepFailed: no frame arrived in time, or a frame arrived that does not match.
+            StepFailed: no frame arrives within the time limit, or the frame matches no pattern.
         """
         queue = self._unread[can_id_of(patterns[0])]
         until_us = self.now_us + within_ms * MS_US + self.resolution_us
@@ -431,11 +444,14 @@ class BusExchange:
             raise StepFailed(f"{got} x {pattern} in {for_ms} ms, want {least}..{most}")
 
     def period(self, pattern: str, each_ms: int, times: int) -> None:
-        """Wait. Raise StepFailed unless matching frames arrive with a period of `each_ms`.
+        """Measure the period of frames that match a pattern, for example of a heartbeat.
+
+        Raises:
+            StepFailed: the mean period is not the expected one, or too few frames arrive.
 
         Args:
             pattern: pattern of the frames.
-            each_ms: expected period of the frames.
+            each_ms: expected period in milliseconds.
             times: number of periods to measure.
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
@@ -468,7 +484,7 @@ class BusExchange:
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Do not count the time since the last poll as a host delay, because the user was asked."""
+        """Do not count the time since the last poll as a delay of the host: the user was asked."""
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:
@@ -484,7 +500,7 @@ class BusExchange:
             self._listen(until_us)
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame. Return a time, and all frames that had arrived by that time."""
+        """Wait for the next frames. Return the time, and all frames that have arrived by then."""
         if until_us <= self._known_us == self._link.now_us:
             return self._known_us, ()  # in virtual time; a poll costs as much as a request
         received = self._listen(until_us)

@@ -33,10 +33,10 @@ def can_id_of(pattern: str) -> str:
 
 
 def matches(pattern: str, text: str) -> bool:
-    """Match a frame. A dot stands for any digit, [..] for one of some digits, * for any rest.
+    """Return whether a frame matches a pattern, both in candump notation.
 
-    >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
-    (True, True)
+    In a pattern, a dot stands for any digit, `[..]` for one of the digits in it, and `*` for any
+    rest of the frame.
     """
     return _compiled(pattern).fullmatch(text) is not None
 
@@ -56,11 +56,11 @@ _DIGITS: Final = 8
 
 
 def unlike(got: str, wanted: Sequence[str]) -> str:
-    """Return the difference between a frame and the expected frames.
+    """Return a text that explains how a received frame differs from the expected ones.
 
     Args:
-        got: frame in candump notation.
-        wanted: patterns of the expected frames. The frame matches none of them.
+        got: received frame in candump notation.
+        wanted: patterns of the expected frames, none of which matches.
     """
     if len(wanted) == 1 and (values := _values(got, wanted[0])):
         return f"got {values[0]}, want {values[1]}"
@@ -76,11 +76,7 @@ def unlike(got: str, wanted: Sequence[str]) -> str:
 
 
 def abort_of(got: str) -> int | None:
-    """Return the abort code of a frame, or None if the frame is not an SDO abort.
-
-    >>> f"{abort_of('585#8000100002000106'):08X}", abort_of("705#00")
-    ('06010002', None)
-    """
+    """Return the abort code in a frame in candump notation, or None if it is no SDO abort."""
     match = _ABORT.fullmatch(got)
     return int(_code(match[2]), 16) if match and match[2].isalnum() else None
 

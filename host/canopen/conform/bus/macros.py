@@ -26,21 +26,21 @@ _POSITION_BYTES: Final = 4
 def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
     sdo: SdoFrames, target: Address, actual: Address, step: str, tolerance: str, within_ms: str
 ) -> None:
-    """Set a target near the actual position, and wait until the drive reaches it.
+    """Move a drive a small distance from its position, and wait until it reaches the target.
 
     Args:
         sdo: SDO client of the drive.
         target: target position (object 607Ah).
-        actual: actual position (object 6064h).
-        step: distance from the actual position in counts. The distance is small, so that no drive
-            makes a jump.
-        tolerance: allowed distance from the target, in counts.
-        within_ms: longest duration of the move, and longest time that the drive may move before the
-            macro.
+        actual: position actual value (object 6064h).
+        step: distance of the target from the actual position, in counts. It is small, so that no
+            drive jumps.
+        tolerance: allowed distance from the target at the end, in counts.
+        within_ms: time limit of the move in milliseconds. The drive must also come to rest within
+            this time before the move.
 
     Raises:
         StepFailed: the drive does not reach the target in time.
-        Disturbed: the drive moves all the time, because something else moves it.
+        Disturbed: the drive does not come to rest before the move, because something else moves it.
     """
     wanted = _rest(sdo, actual, int(within_ms)) + int(step)
     sdo.write(target, (wanted & 0xFFFF_FFFF).to_bytes(_POSITION_BYTES, "little"))
@@ -151,9 +151,12 @@ def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def room(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Start a download of this size and finish it. NotAllowed is raised if the object is too short.
+    """Check that an object can hold a value of this size. The SDO download is started and aborted.
 
-    An EDS does not give the length that a string can hold.
+    A check needs this because an EDS does not give the maximum length of a string.
+
+    Raises:
+        NotAllowed: the node answers that the object is too short.
     """
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
     mux = multiplexer(at)
@@ -268,9 +271,9 @@ def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> N
 
 
 def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
-    """Enable a PDO. If the PDO has no mapping, map objects first.
+    """Enable a PDO by its COB-ID. If the PDO has no mapping, first map the given objects.
 
-    The node may refuse to enable a PDO without a mapping.
+    A node may refuse to enable a PDO without a mapping.
     """
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     sdo.write((head, 1), cob_id[:3] + bytes([cob_id[3] | 0x80]))
@@ -294,13 +297,13 @@ def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> Non
 
 
 def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
-    """Guard a node. The node must report the states in turn, with an alternating toggle bit.
+    """Request node guarding several times, and check the reported NMT states and the toggle bit.
 
     Args:
-        sdo: frames to and from the SDO server, used for their bus.
-        can_id: CAN-ID of error control.
-        words: states in hex, each requested once. `=7F` expects a toggle bit of 0. A word with # is
-            a frame that is sent before the request.
+        sdo: SDO frames of the node, used for access to the bus.
+        can_id: CAN-ID of the node's error control messages.
+        words: expected states in hex, one per request. `=7F` expects the state 7Fh with a toggle
+            bit of 0. A word with # is a frame that is sent before the next request.
     """
     toggle: int | None = None
     for word in words:

@@ -30,23 +30,24 @@ _MOST_MISNAMED: Final = 20
 
 
 def number_of(data: bytes) -> int | None:
-    """Return an unsigned number of at most 32 bits, or None if the bytes are not such a number."""
+    """Return bytes as an unsigned number of at most 32 bits, or None for any other length."""
     return int.from_bytes(data, "little") if len(data) in _NUMBER_BYTES else None
 
 
 class SdoClient:
-    """The client of the default SDO server of a node. Its methods block until the transfer ends.
+    """SDO client of the tester, which reads and writes objects of the node under test.
 
-    The client ignores frames that are not answers of the node.
+    Its methods block until the transfer ends. Frames that are not SDO answers of the node are
+    ignored.
 
     Args:
-        exchange: bus of the node.
+        exchange: bus with the node.
         node_id: node-ID of the node, 1..127.
 
     Attributes:
-        misnamed: answers that name another object than the requested one, one per line.
-        size_of: function that returns the size of an object, used for answers that do not indicate
-            their size.
+        misnamed: texts about answers that name another object than the requested one.
+        size_of: function that returns the size of an object in bytes. It is used for answers that
+            do not indicate their size.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -56,13 +57,13 @@ class SdoClient:
         self.size_of: SizeOf = dict[Address, int]().get
 
     def upload(self, index: int, sub: int) -> bytes:
-        """Read an object. Repeat an unanswered request once.
+        """Read an object of the node. If the node does not answer, the request is repeated once.
 
         Raises:
-            SdoAborted: the node refuses.
-            SdoTimeout: the node does not answer.
+            SdoAborted: the node refuses the request.
+            SdoTimeout: the node does not answer both requests.
             SdoMisnamed: the answer of the node names another object.
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         size = self.size_of((index, sub)) or 0
         try:
@@ -78,22 +79,29 @@ class SdoClient:
             self.run(download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number of at most 32 bits, or None if the node does not give one."""
+        """Read an object as an unsigned number of at most 32 bits.
+
+        Return None if the transfer fails, or if the value has another length.
+        """
         try:
             return number_of(self.upload(index, sub))
         except SdoFailed:
             return None
 
     def abort(self) -> None:
-        """End a transfer that a check left open. Some stacks check which object the abort names."""
+        """Abort the SDO transfer that a check has left open.
+
+        The abort names the object of this transfer, because some CANopen stacks check it.
+        """
         at = sdo_frame.index_sub(self._exchange.transfer)
         frame = Abort(*at, sdo_frame.AbortCode.GENERAL).encode()
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
-        """Run a script, and return its result or raise its error.
+        """Run a script of SDO requests with the node. Return its result, or raise its error.
 
-        LinkClosed is raised without a bus.
+        Raises:
+            LinkClosed: the connection to the bus is lost.
         """
         exchange, talk = self._exchange, self._session.dialogue
         for request in exchange.unanswered:  # by the check, which talks for itself
@@ -123,10 +131,12 @@ ABORTED: Final = 0x80
 
 
 class SdoFrames:
-    """The default SDO server of a node, as a check sees it.
+    """Single SDO frames between a check and the node, for checks that judge each frame.
+
+    A client for whole transfers is `SdoClient`.
 
     Args:
-        exchange: bus of the node.
+        exchange: bus with the node.
         node_id: node-ID of the node, 1..127.
     """
 
@@ -140,7 +150,7 @@ class SdoFrames:
         self.exchange.send(data_frame(self._request, data))
 
     def answer(self, *patterns: str) -> bytes:
-        """Wait for a response that matches one of the patterns. Return the data of the response."""
+        """Wait for an SDO response that matches one of the patterns. Return its data bytes."""
         wanted = [f"{self._response}#{pattern}" for pattern in patterns]
         return bytes.fromhex(self.exchange.expect(wanted, ANSWER_MS)[4:])
 
@@ -173,7 +183,11 @@ class SdoFrames:
             self.answer(f"{head:02X}{part:.<14}")
 
     def read_other(self, at: Address, data: str) -> None:
-        """Read an object of at most 4 bytes. Raise StepFailed if the object has this value."""
+        """Read an object of at most 4 bytes, whose value must differ from `data`.
+
+        Raises:
+            StepFailed: the object has the value `data`.
+        """
         if self.read_data(at, len(data) // 2) == bytes.fromhex(data):
             raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
 
@@ -188,7 +202,11 @@ class SdoFrames:
         self.answer(*_aborts(at, codes))
 
     def download(self, at: Address, data: bytes) -> None:
-        """Send the request to write an object, expedited or with the number of bytes to follow."""
+        """Send the first request of an SDO download.
+
+        A value of 1 to 4 bytes is in this request (expedited transfer). Otherwise the request
+        contains the number of bytes that follow in segments.
+        """
         mux = bytes.fromhex(multiplexer(at))
         if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:
             self.say(bytes([_sized(_DOWNLOAD, len(data)), *mux]) + data.ljust(4, b"\0"))
@@ -196,9 +214,9 @@ class SdoFrames:
             self.say(bytes([0x21, *mux]) + len(data).to_bytes(4, "little"))
 
     def download_segments(self, data: bytes) -> None:
-        """Send the segments of a started download.
+        """Send the segments of an SDO download that has been started.
 
-        Each segment follows the response to the one before.
+        Before each next segment, the node must have acknowledged the one before.
         """
         for number, start in enumerate(range(0, len(data), sdo_frame.SEGMENT_BYTES)):
             part, toggle = data[start : start + sdo_frame.SEGMENT_BYTES], (number & 1) << 4

@@ -27,13 +27,16 @@ _POWER_OFF_MS: Final = 200
 
 
 class StepPlayer:
-    """Player that performs the steps of a check after its names have become numbers.
+    """Player that executes the steps of a conformance check on the bus, one after the other.
+
+    The names in the steps have already been replaced by numbers of the node.
 
     Args:
-        exchange: bus of the node.
+        exchange: bus with the node.
         node_id: node-ID of the node, 1..127.
-        stimulus: function that operates the inputs of the device, or None if there is none.
-        client: client that reads and writes objects when a check does not judge the frames.
+        stimulus: function that operates the inputs of the device, or None if the user gave no
+            stimulus.
+        client: SDO client for steps in which the check does not judge the single frames.
     """
 
     def __init__(
@@ -43,7 +46,11 @@ class StepPlayer:
         self._sdo = SdoFrames(exchange, node_id)
 
     def play(self, step: check.Step) -> None:
-        """Do one step. Raise StepFailed if the node does not react as the step requires."""
+        """Execute one step of a check.
+
+        Raises:
+            StepFailed: the node does not react as the step requires.
+        """
         action, bus = step.action, self._exchange
         match action:
             case check.OfObject():
@@ -149,7 +156,7 @@ class _Client(Protocol):
 
 
 def play_of_object(client: _Client, action: check.Hold | check.RefuseRewrite) -> None:
-    """Do a step of an object check.
+    """Execute a step of a check about one object of the EDS, such as reading its value.
 
     Raises:
         StepFailed: the node does not react as the step requires.
