@@ -77,13 +77,13 @@ FENCES: Final[tuple[Object, ...]] = (
 
 @dataclass(slots=True)  # not frozen: frozen requests take three times as long to create
 class SdoRequest:
-    """Step that sends an SDO request. The result is the response.
+    """Step of a script that sends an SDO request and waits for the response, which is its result.
 
     SdoTimeout is raised if no response arrives.
 
     Attributes:
-        goes_on: whether the request continues a transfer of the server. Otherwise the request
-            starts a transfer.
+        goes_on: whether the request continues a transfer that the server has open. Otherwise the
+            request starts a transfer.
     """
 
     request: bytes
@@ -108,7 +108,10 @@ class NmtRequest:
 
 @dataclass(frozen=True, slots=True)
 class AwaitState:
-    """Step that waits for a heartbeat or boot-up with a given state. It raises StateTimeout."""
+    """Step of a script that waits until the node reports an NMT state by heartbeat or boot-up.
+
+    StateTimeout is raised if the node does not report the state in time.
+    """
 
     state: NmtState
     timeout_us: int
@@ -116,13 +119,14 @@ class AwaitState:
 
 @dataclass(frozen=True, slots=True)
 class AwaitReport:
-    """Step that waits for any heartbeat or node guarding response.
+    """Step of a script that waits until the node reports any NMT state.
 
-    The result is the state in the response, or None without a response.
+    A heartbeat or a response to node guarding counts. The result is the reported state, or None
+    after the time-out.
 
     Attributes:
-        timeout_us: time to wait.
-        boot_up: whether a boot-up also counts.
+        timeout_us: time to wait, in microseconds.
+        boot_up: whether a boot-up message also counts.
     """
 
     timeout_us: int
@@ -155,10 +159,7 @@ Send = Callable[[int, bytes], None]
 
 
 def nothing(*_: object) -> None:
-    """Do nothing.
-
-    The script is used if the host guards no node, or if no caller needs a script's result.
-    """
+    """Do nothing. This is the default for callbacks that a caller does not need."""
 
 
 Misnamed = Callable[[Object, bytes], object]
@@ -166,7 +167,7 @@ Misnamed = Callable[[Object, bytes], object]
 
 
 class QueuedScript(NamedTuple):
-    """A script, and the callbacks for its end.
+    """A script that waits to be run with a node, and the callbacks for its end.
 
     Attributes:
         what: description of the script for messages.
@@ -185,9 +186,10 @@ class QueuedScript(NamedTuple):
 
 
 class Unanswered(list[Object]):
-    """The objects of the requests that the server may still answer, in the order of the requests.
+    """Objects of SDO requests that the server may still answer, in the order of the requests.
 
-    A repeated request counts once.
+    A late answer to such a request must not be taken for the answer to a later one. A repeated
+    request counts once.
     """
 
     def add(self, at: Object) -> None:
@@ -196,19 +198,19 @@ class Unanswered(list[Object]):
             self.append(at)
 
     def hear(self, at: Object) -> None:
-        """Drop the requests before those about an object that the server has answered.
+        """Forget the requests that were sent before one that the server has answered now.
 
-        The server no longer answers the dropped requests.
+        The server no longer answers the earlier ones.
         """
         if at in self:
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
-        """Return an object to read, whose answer proves that no answer about `at` can follow.
+        """Return an object to read, whose answer comes after all late answers about object `at`.
 
-        The latest request is preferred, so that a node that is gone gets requests for the same
-        fence. If all fences are open, the oldest request is dropped. A server that answers at this
-        point has left more than 250 requests unanswered.
+        The latest such object is preferred, so that a node that is gone gets repeated requests for
+        the same object. If all such objects have unanswered requests, the oldest request is
+        dropped. A server that answers at this point has left more than 250 requests unanswered.
         """
         last = self[-1]
         if last in FENCES and last != at:

@@ -15,10 +15,11 @@ MOST_BYTES: Final = 32_000_000
 
 
 def read_eds_bytes(path: Path) -> bytes:
-    """Return the bytes of an EDS file.
+    """Read an EDS file as bytes, up to the largest size that an EDS may have.
 
-    OSError is raised if the file cannot be read. EdsError is raised if the file is too large for an
-    EDS.
+    Raises:
+        OSError: the file cannot be read.
+        EdsError: the file is too large for an EDS.
     """
     with path.open("rb") as file:
         data = file.read(MOST_BYTES + 1)
@@ -44,11 +45,11 @@ def _check_kind(path: Path, data: bytes) -> None:
 
 
 def open_eds(path: Path) -> EdsFile:
-    """Return the sections of a file.
+    """Read an EDS, DCF, XDD or XDC file, and return its sections.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: the file is too large for an EDS, or is of another kind.
+        EdsError: the file is too large for an EDS, or has another format.
     """
     data = read_eds_bytes(path)
     _check_kind(path, data)
@@ -56,14 +57,14 @@ def open_eds(path: Path) -> EdsFile:
 
 
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
-    """Return the sections of a file and the device they describe. Equal bytes are parsed only once.
+    """Read an EDS, DCF, XDD or XDC file. Return its sections and the device that they describe.
 
-    The sections and the device are shared between callers. Only read them, and do not add findings
-    to the file.
+    Files with equal bytes are parsed only once, so callers share the result. Do not change it, and
+    do not add findings to the file.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: the file is too large for an EDS, or is of another kind.
+        EdsError: the file is too large for an EDS, or has another format.
     """
     data = read_eds_bytes(path)
     _check_kind(path, data)
@@ -78,14 +79,14 @@ def sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
 
 
 def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
-    """Read the valid parts of an EDS, for a host that displays or manages a device.
+    """Read the valid parts of an EDS, for a host that displays or manages the device.
 
     Returns:
         The device without its unusable objects, and all findings in the file.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: the file has no usable object, or is too large.
+        EdsError: the file has no valid object, or is too large.
     """
     file, device = read_sheet(path)
     if not device.entries:

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 
 class SdoFailed(Exception):  # noqa: N818 - what the transfer did
-    """An SDO transfer that failed.
+    """Base class of the errors that end an SDO transfer.
 
     Attributes:
-        index: index of the object.
+        index: index of the object that was read or written.
         sub: sub-index of the object.
     """
 
@@ -25,10 +25,10 @@ class SdoFailed(Exception):  # noqa: N818 - what the transfer did
 
 
 class SdoAborted(SdoFailed):
-    """A transfer that was aborted.
+    """Raised if an SDO transfer is aborted, by the device or by the host.
 
     Attributes:
-        code: code as an AbortCode. An unknown code stays a number.
+        code: SDO abort code. A code that CiA 301 does not define is a plain number.
     """
 
     def __init__(self, index: int, sub: int, code: int) -> None:
@@ -38,10 +38,10 @@ class SdoAborted(SdoFailed):
 
 
 class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
-    """A transfer that the device did not answer.
+    """Raised if the device does not answer an SDO request in time.
 
     Attributes:
-        timeout_us: time that the host waited for an answer.
+        timeout_us: time that the host waited for the answer, in microseconds.
     """
 
     def __init__(self, index: int, sub: int, timeout_us: int = 0) -> None:

@@ -62,11 +62,11 @@ OK: Final = "OK"
 
 
 class GatewayError(Exception):
-    """A command that the gateway does not execute.
+    """Raised if the gateway cannot execute a command of its client.
 
     Args:
-        text: reason in words.
-        code: error code of the reason.
+        text: reason for the client. If it is empty, the text of the code is used.
+        code: error code of CiA 309-3 that the client gets.
     """
 
     def __init__(self, text: str, code: _GatewayErrorCode = _GatewayErrorCode.SYNTAX) -> None:
@@ -103,10 +103,12 @@ def _sequence_of(line: str) -> int:
 
 
 def parse_request(line: str) -> _GatewayRequest | None:
-    """Parse a command line. Return None for an empty line and for a comment.
+    """Parse a command line of a gateway client (CiA 309-3), such as `[1] 4 read 0x1008 0 vs`.
+
+    The result is None for an empty line and for a comment.
 
     Raises:
-        GatewayError: the line is not a command.
+        GatewayError: the line is not a valid command.
     """
     if not line.strip() or line.lstrip().startswith("#"):
         return None
@@ -187,11 +189,11 @@ def _data_type(word: str) -> str:
 
 
 def encode(name: str, words: Sequence[str]) -> bytes:
-    """Return the bytes of a value.
+    """Convert the value in a gateway command to the bytes of the object.
 
     Args:
-        name: name of a data type in `_NAMES`.
-        words: value as the client wrote it, which is a single word except for `hex`.
+        name: name of a data type in CiA 309-3, one of `_NAMES`.
+        words: value as the client wrote it. It is a single word except for the type `hex`.
 
     Raises:
         GatewayError: the words are not a value of this type.
@@ -211,10 +213,12 @@ def encode(name: str, words: Sequence[str]) -> bytes:
 
 
 def decode(name: str, data: bytes) -> str:
-    """Return the text for the bytes of an object, in hexadecimal if they do not fit the type.
+    """Convert the bytes of an object to the text that a gateway answer contains.
+
+    Bytes that do not fit the data type are shown in hexadecimal.
 
     Args:
-        name: name of a data type in `_NAMES`, empty if the client names no type.
+        name: name of a data type in CiA 309-3, one of `_NAMES`, or empty if the client named none.
         data: bytes of the object.
     """
     if name == _STRING:
@@ -265,11 +269,11 @@ _LSS_HELP: Final = """\
 
 
 def carry_out(bus: NodeBus, request: _GatewayRequest) -> str:
-    """Carry out a command of `LSS_VERBS`, and return the answer.
+    """Execute an LSS command of a gateway client (CiA 309-3). Return the answer.
 
     Raises:
-        GatewayError: the command is not valid, or the slave refuses or does not answer.
-        LinkClosed: the bus is gone.
+        GatewayError: the command is not valid, or an LSS slave refuses it or does not answer.
+        LinkClosed: the connection to the bus is lost.
     """
     scan_us = SCAN_US
     if request.verb in _SCANS and request.words:
@@ -404,15 +408,15 @@ vs: visible string, in double quotes; os, us, d: base64; hex: bytes as 01 AB"""
 
 
 class Gateway:
-    """Gateway that answers the lines of one client. Each client has its own settings.
+    """CANopen gateway for one client, which executes its command lines (CiA 309-3, ASCII mapping).
 
-    Not emulated: PDO and emergency commands, device commands such as `set heartbeat`, unsolicited
-    events, SDO block transfer.
+    Each client has its own settings. The gateway does not support PDO and emergency commands,
+    device commands such as `set heartbeat`, unsolicited events, and SDO block transfer.
 
     Args:
-        bus: bus of the net.
-        net: number of the net.
-        version: version of the gateway, used for `info version`.
+        bus: bus on which the gateway executes the commands.
+        net: number by which clients address this bus.
+        version: version of the gateway, which it answers to `info version`.
     """
 
     def __init__(self, bus: NodeBus, net: int, version: str) -> None:
@@ -430,7 +434,10 @@ class Gateway:
         }
 
     def answer(self, line: str) -> str:
-        """Answer a line without its line end. An empty line or a comment gets an empty answer."""
+        """Execute a command line and return the answer, both without line ends.
+
+        The answer to an empty line or a comment is empty.
+        """
         try:
             request = parse_request(line)
             return "" if request is None else _numbered(request, self._carry_out(request))

@@ -56,7 +56,7 @@ _Listen = Callable[[int], tuple[int, StampedFrames]]
 
 
 def state_of(frame: CanFrame) -> NmtState | None:
-    """Return the state that an error control frame reports, or None if it reports none."""
+    """Return the NMT state in a heartbeat, boot-up or node guarding frame, or None if invalid."""
     try:
         return NmtState(frame.data[0] & _STATE_BITS) if len(frame.data) == 1 else None
     except ValueError:
@@ -64,18 +64,19 @@ def state_of(frame: CanFrame) -> NmtState | None:
 
 
 class ErrorControl:
-    """Error control that detects the loss of a node by its heartbeat or by node guarding.
+    """Monitors one node by its heartbeat or by node guarding, to detect that the node is lost.
 
     Args:
-        heartbeat_us: consumer heartbeat time, or 0 for none.
-        guard_us: guard time, or 0 for none.
+        heartbeat_us: time without a heartbeat after which the node is lost, in microseconds, or 0
+            to not monitor the heartbeat.
+        guard_us: period of node guarding requests in microseconds, or 0 for none.
         life_time_factor: number of requests without an answer after which the node is lost.
-        request: function that sends a request of node guarding.
+        request: function that sends a node guarding request.
 
     Attributes:
-        due_us: time of the next call of `tick`.
+        due_us: time at which `tick` must be called next.
         what: name of the protocol, `heartbeat` or `guarding`.
-        silence_us: time without a frame of the node after which the node is lost.
+        silence_us: time without a frame of the node after which it is lost, in microseconds.
     """
 
     def __init__(
@@ -122,19 +123,20 @@ class ErrorControl:
 
 
 class NodeSession:
-    """The requests of a host to one node, and the frames of this node.
+    """Communication of a host with one node: SDO requests, node guarding and NMT states.
 
     Args:
         node_id: node-ID of the node, 1..127.
         send: function that sends a data frame. Its arguments are CAN-ID and data.
         guard: function that sends a remote frame. Its argument is the CAN-ID.
-        sdo_timeout_us: time to wait for an SDO response.
-        on_misnamed: function that is called with answers that name another object; see `Dialogue`.
+        sdo_timeout_us: time to wait for an SDO response, in microseconds.
+        on_misnamed: function that is called with each SDO answer that names another object than the
+            request; see `Dialogue`.
 
     Attributes:
         node_id: node-ID of the node.
-        dialogue: dialogue that runs the scripts.
-        state: last reported state, or None until the first report.
+        dialogue: dialogue that runs the scripts with this node.
+        state: last NMT state that the node has reported, or None if it has reported none.
     """
 
     def __init__(
@@ -152,9 +154,9 @@ class NodeSession:
         self._error_control = ERROR_CONTROL_COB_ID + node_id
 
     def receive(self, now_us: int, frame: CanFrame) -> NmtState | None:
-        """Process a frame of the bus.
+        """Process a received frame. Frames of other nodes are ignored.
 
-        Return the state that the frame reports, or None if it reports none.
+        Return the NMT state that the frame reports, or None if it reports none.
         """
         can_id, data, remote, extended, _ = frame
         if remote or extended:
@@ -168,14 +170,14 @@ class NodeSession:
         return None
 
     def run(self, script: dialogue.Script[T], listen: _Listen) -> T:
-        """Run a script to its end, and return its result or raise its error.
+        """Run a script of requests with the node to its end. Return its result, or raise its error.
 
         Args:
             script: script to run. No other script runs at the same time.
-            listen: function that waits for frames.
+            listen: function that waits for frames and returns them with the time.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         ended: list[T | Exception] = []
         job = dialogue.QueuedScript("", script, ended.append, ended.append)

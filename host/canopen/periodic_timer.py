@@ -6,9 +6,9 @@ from tickrig.wire.instant import NEVER
 
 
 class PeriodicTimer:
-    """Timer that reports the end of each period.
+    """Timer that must be polled, and reports when a period has ended.
 
-    After a pause, the timer reports once, not for each missed period.
+    If it was not polled for several periods, it reports once.
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)
@@ -31,9 +31,9 @@ class PeriodicTimer:
             self.due_us = now_us + self._period_us
 
     def advance(self, now_us: int) -> bool:
-        """Start the next period if the current period has ended. Return whether it has ended.
+        """Return whether the current period has ended. If so, the next period starts.
 
-        A pause does not shift the ends of later periods.
+        A late call does not shift the ends of later periods.
         """
         if now_us < self.due_us:
             return False

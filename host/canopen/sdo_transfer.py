@@ -20,17 +20,17 @@ from tickrig.wire.canopen.sdo_frame import (
 
 
 def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
-    """Read an object.
+    """Script that reads an object by SDO, with an expedited or segmented transfer.
 
     Args:
         index: index of the object.
         sub: sub-index of the object.
-        size: size of the object in bytes, or 0 if unknown. The size is used for an expedited answer
-            that does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
+        size: size of the object in bytes, or 0 if it is unknown. It is used if an expedited answer
+            does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
-        SdoAborted: the device refuses, or sends an unexpected answer.
-        SdoTimeout: the device does not answer.
+        SdoAborted: the device refuses the request, or sends an unexpected answer.
+        SdoTimeout: the device does not answer in time.
     """
     answer = yield SdoRequest(frame_at(ClientCommand.UPLOAD, index, sub), index, sub)
     match answer:

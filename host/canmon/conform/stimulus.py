@@ -391,8 +391,7 @@ def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
     """Listen to a bus for some time. Return the number of received frames by node-ID of the sender.
 
     Args:
-        link: connection to the bus. The frames received meanwhile are lost for other readers of
-            this link.
+        link: connection to the bus. Other readers of this link do not get the received frames.
         span_us: time to listen, in microseconds.
     """
     heard = Counter[int]()

@@ -180,7 +180,7 @@ class Hold(OfObject):
         kind: name of the data type that the value must have.
         low: lowest allowed value, or None for the lowest value of the type.
         high: highest allowed value, or None for the highest value of the type.
-        value: only allowed value in hex, or None for any value.
+        value: the only allowed value in hex, or None for any value.
         codes: SDO abort codes with which the node may refuse to give the value.
     """
 

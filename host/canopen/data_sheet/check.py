@@ -76,6 +76,9 @@ def severities(findings: Iterable[RuleFinding]) -> str:
 
 
 def failing(findings: Iterable[RuleFinding], *, strict: bool = False) -> list[RuleFinding]:
-    """Return the findings that make a check fail: errors, and warnings if `strict` is set."""
+    """Return the findings that make `canmon eds check` fail.
+
+    These are the errors, and with `strict` also the warnings.
+    """
     count = (Severity.ERROR, Severity.WARNING) if strict else (Severity.ERROR,)
     return [one for one in findings if one.rule.severity in count]

@@ -75,7 +75,10 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return the meanings of the first non-ASCII byte of a line in each possible encoding."""
+        """Return a text with the letters that the first non-ASCII byte of a line stands for.
+
+        An EDS does not name its encoding, so there is one letter for each possible encoding.
+        """
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
         pages = dict.fromkeys((self.encoding, *eds_file.CODE_PAGES))
@@ -91,7 +94,7 @@ class Document:
         return self._subs.get(index, [])
 
     def entries(self, index: int) -> list[EntryDescription]:
-        """Return the entries of an object by sub-index; empty if the object does not exist."""
+        """Return the entries of an object by sub-index; empty if the EDS lacks the object."""
         return self._entries.get(index, [])
 
     def section_of(self, row: EntryDescription) -> str:
@@ -102,14 +105,15 @@ class Document:
     def found(
         self, rule: str, text: str, section: str = "", line: int | str = "", *edits: Edit
     ) -> RuleFinding:
-        """Create a finding.
+        """Create the finding that a part of this file violates a rule.
 
         Args:
-            rule: name of the rule.
-            text: value in the file, and the allowed values.
+            rule: name of the violated rule.
+            text: invalid value, and the allowed values.
             section: title of the section, empty for the file as a whole.
-            line: line number, or keyword of the line. By default, it is the line of the section.
-            edits: edits that fix the finding.
+            line: line number, or a keyword whose line is meant. By default, it is the first line of
+                the section.
+            edits: edits of the file that correct the violation.
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
@@ -159,7 +163,7 @@ class Document:
         return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
-        """Return the keywords of a section. If several sections have this name, use the first."""
+        """Return the `KEY=VALUE` lines of a section, or of the first section with this title."""
         return [line for line in self._blocks.get(section, ()) if line.is_keyword]
 
     def _read_blocks(self) -> dict[str, list[EdsLine]]:

@@ -49,14 +49,15 @@ class _Fixed:
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
-    """Fix a file until no fix changes it. All bytes of lines without findings are kept.
+    """Correct the errors and warnings of an EDS that need no knowledge about the device.
 
-    A file that looks truncated is not changed, because it would look complete after a fix. Files in
-    other encodings than Unicode are converted to UTF-8.
+    Lines without findings keep all their bytes. A file that looks truncated is not changed, because
+    it would look complete after a fix. A file in another encoding than Unicode is converted to
+    UTF-8.
 
     Args:
-        document: file to fix.
-        ascii_only: whether to replace non-ASCII letters by ASCII ones.
+        document: EDS to correct.
+        ascii_only: whether to replace letters outside ASCII by ASCII letters.
     """
     mended: list[RuleFinding] = []
     origins = list(range(1, len(document.texts) + 1))

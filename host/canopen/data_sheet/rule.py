@@ -38,11 +38,11 @@ class _EdsRule(NamedTuple):
 
 
 def read_rules(path: Path) -> dict[str, _EdsRule]:
-    """Return the rules of a file by name, in the order of the file.
+    """Read the descriptions of EDS rules from a text file. Return them by name, in file order.
 
     Args:
-        path: text file with a heading for each severity, such as `[error]`. The heading is followed
-            by one rule per line: name, clause, consequence and fix, separated by ` | `.
+        path: text file with a heading for each severity, such as `[error]`. Below it is one rule
+            per line: name, clause, consequence and fix, separated by ` | `.
     """
     rules: dict[str, _EdsRule] = {}
     severity = Severity.ERROR
@@ -65,12 +65,11 @@ class EditPlace(Enum):
 
 
 class Edit(NamedTuple):
-    """One edit of a file.
+    """One change to the lines of an EDS that corrects a finding.
 
     Attributes:
-        line: number of the line. 0 is before the first line.
-        place: effect of the edit: replacing the line, inserting lines after it, or changing the
-            whole file.
+        line: number of the line, from 1. 0 stands for the place before the first line.
+        place: whether the new lines replace the line, follow it, or replace the whole file.
         lines: new lines, without line ends.
     """
 
@@ -81,16 +80,15 @@ class Edit(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RuleFinding:
-    """A violation of a rule.
+    """One violation of a rule in an EDS or a bus.yml, with its position.
 
     Attributes:
         rule: rule that is violated.
         file: name of the file.
         line: line number, or 0 for the file as a whole.
         section: title of the section, empty outside of sections.
-        text: value in the file, and the allowed values.
-        edits: edits that fix the violation. There are no edits if a fix needs knowledge of the
-            device.
+        text: invalid value, and the allowed values.
+        edits: edits that correct the violation, empty if this needs knowledge about the device.
     """
 
     rule: _EdsRule

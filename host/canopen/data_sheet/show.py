@@ -121,10 +121,10 @@ def _entry(document: Document, row: EntryDescription) -> dict[str, Any]:
 
 
 def pdos(document: Document, node_id: int) -> list[dict[str, Any]]:
-    """Return the PDOs of a node with their power-on values.
+    """Return the PDOs that an EDS describes, with their power-on values, for display.
 
     Args:
-        document: document of the EDS file.
+        document: EDS to display.
         node_id: node-ID of the node, 1 to 127.
     """
     return [
@@ -165,7 +165,7 @@ def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
-    """Return a table as lines of text, the header first. The last column is not padded."""
+    """Format rows as a table with aligned columns. The first line is the header."""
     return aligned([columns, *([str(row[column]) for column in columns] for row in rows)])
 
 
@@ -199,10 +199,11 @@ _WHOLE: Final = ("object", "entry")
 
 
 def diff(one: Document, other: Document) -> list[_Change]:
-    """Return all differences, first of device, identity and bit rates, then of objects by index.
+    """Return the differences between two EDS files, in what they state about the device.
 
-    The order of sections and the notation of numbers are ignored. Dates, file names and comments
-    are also ignored, because they do not concern the device.
+    Differences in the device, its identity and its bit rates come first, then those in objects, by
+    index. The order of sections, the notation of numbers, dates, file names and comments are
+    ignored, because they do not concern the device.
     """
     return [*_device(one, other), *_objects(one, other)]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ObjectWrite:
-    """A value of the concise DCF (object 1F22h).
+    """Value that a master writes to an object of a slave at boot-up, from its concise DCF (1F22h).
 
     Attributes:
         index: index of the object.
         sub: sub-index of the object.
-        data: bytes to write, little endian.
+        data: bytes that the master writes, little endian.
     """
 
     index: int

@@ -117,12 +117,12 @@ _U32: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class BootStep:
-    """One step of a boot-up in words.
+    """One step of a slave's boot-up as text, for the user.
 
     Attributes:
         request: request that the master sent, or event that the master waited for.
         answer: answer of the slave.
-        meaning: consequence of the answer.
+        meaning: what follows from the answer.
     """
 
     request: str
@@ -138,10 +138,10 @@ _OnStep = Callable[[BootStep], None]
 
 
 class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of it
-    """Error that ends a boot-up, because the slave cannot be booted.
+    """Raised inside the boot-up of a slave to end it, because the slave cannot be booted.
 
     Attributes:
-        status: error status with the reason.
+        status: error status, which contains the reason (CiA 302-2).
     """
 
     def __init__(self, status: BootStatus) -> None:
@@ -150,10 +150,10 @@ class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of
 
 
 class BootTalk:
-    """Requests and waits of a boot-up. Each step is reported.
+    """Requests and waits during the boot-up of a slave. Each one is reported as a step.
 
     Args:
-        on_step: function that is called with each step.
+        on_step: function that is called with each completed step.
     """
 
     def __init__(self, on_step: _OnStep) -> None:
@@ -162,7 +162,10 @@ class BootTalk:
     def report(
         self, what: str, wait_us: int, status: BootStatus, *, boot_up: bool = True
     ) -> Script[NmtState]:
-        """Wait for a boot-up or a state. End the procedure if it does not arrive."""
+        """Wait until the slave sends a boot-up message or its NMT state, and return this state.
+
+        If nothing arrives in time, the boot-up ends with the given error status.
+        """
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
             self.fail(what, f"none within {wait_us // 1_000} ms", status)
@@ -199,14 +202,14 @@ class BootTalk:
         tries: int = 1,
         answered: bool = True,
     ) -> Script[None]:
-        """Write an object. End the procedure if the slave refuses or does not answer.
+        """Write an object of the slave. If the slave refuses or does not answer, the boot-up ends.
 
         Args:
             write: object and value to write.
-            status: error status if the procedure ends.
-            what: text for the step. By default it is object and value.
-            tries: number of attempts while there is no answer.
-            answered: whether an answer is required.
+            status: error status with which the boot-up would end.
+            what: text for the reported step. By default, it is the object and the value.
+            tries: number of attempts if the slave does not answer.
+            answered: whether a missing answer ends the boot-up.
         """
         what = what or f"{write.index:04X}h:{write.sub:02X} := {_as_hex(write.data)}"
         try:
@@ -227,7 +230,10 @@ class BootTalk:
         return (yield from download(write.index, write.sub, write.data))
 
     def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
-        """End the procedure if a number differs from the expected one. Skip an expected 0."""
+        """End the boot-up if a value of the slave differs from the expected number.
+
+        An expected number of 0 means that any value is accepted.
+        """
         if expected and not _is_value(data, expected):
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
@@ -363,11 +369,11 @@ _COMMUNICATION: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class BootOutcome:
-    """The outcome of a boot-up.
+    """Result of the boot-up of a slave.
 
     Attributes:
-        status: error status of the boot-up.
-        state: last reported state of the slave, or None if the slave reported none.
+        status: error status of the boot-up (CiA 302-2), which also stands for success.
+        state: last NMT state that the slave has reported, or None if it has reported none.
     """
 
     status: BootStatus
@@ -375,7 +381,7 @@ class BootOutcome:
 
 
 class SlaveBoot:
-    """One boot-up of a slave.
+    """The boot-up of one slave by the master, as CiA 302-2 defines it.
 
     As in Lely's master, two functions are missing:
 
@@ -383,8 +389,8 @@ class SlaveBoot:
     - the boot-up of a slave that another node configures (1F25h)
 
     Args:
-        slave: values that the master expects of the slave.
-        on_step: function that is called with each step.
+        slave: settings that the master has for the slave, such as its expected identity.
+        on_step: function that is called with each completed step.
     """
 
     def __init__(self, slave: SlaveAssignment, on_step: _OnStep) -> None:

@@ -48,16 +48,18 @@ class _Named(dict[str, V]):
 
 
 class CanopenMaster(Closing):
-    """A CANopen master. Time passes only in its methods, which do the work that is due.
+    """CANopen master that boots, starts and monitors the slaves of a bus, with PDOs and drives.
+
+    Time passes only in its methods, such as `boot` or `wait_until`, which do all work that is due.
 
     Args:
-        link: connection to the bus, such as `bench.link` or a `CanLink`. The master closes this
-            link.
-        plan: behaviour of the master, with its slaves.
+        link: connection to the bus, such as `bench.link` or a `CanLink`. The master closes it at
+            the end.
+        plan: settings of the master and of its slaves.
 
     Attributes:
-        nmt: NMT master that the master runs.
-        joints: axes of drives by name.
+        nmt: NMT master that does the work.
+        joints: drive axes by name of the joint.
 
     Raises:
         TypeError: the link is a serial line.
@@ -96,13 +98,13 @@ class CanopenMaster(Closing):
         self.joints = _Named("joint", {driver.name: driver for driver in drivers})
 
     def boot(self, within: _Duration = "10s") -> None:
-        """Start the network. Time passes until each slave has booted.
+        """Start the network, and let time pass until each slave has booted.
 
         Args:
             within: time limit in microseconds, or as a text such as `"100ms"`.
 
         Raises:
-            BootFailed: some slaves have not booted. The message contains these slaves and the
+            BootFailed: a slave has not booted in time. The message lists all such slaves and the
                 reasons.
         """
         self.wait_until(self._all_booted, within)
@@ -115,7 +117,9 @@ class CanopenMaster(Closing):
         self.wait_until(lambda: False, duration)
 
     def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
-        """Let time pass until a condition holds.
+        """Let time pass until a condition holds, or until a time limit.
+
+        Meantime, the master does its work.
 
         Args:
             done: function that returns whether the condition holds.
@@ -125,7 +129,7 @@ class CanopenMaster(Closing):
             True if the condition holds, or False if the time limit came first.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
             TypeError: the time is neither a whole number nor a text.
             ValueError: the text is not a time, or the time is negative.
         """
@@ -137,11 +141,13 @@ class CanopenMaster(Closing):
         return True
 
     def perform(self, *operations: Operation) -> None:
-        """Run operations of joints in parallel: `master.perform(left.init(), right.init())`.
+        """Run operations of drives in parallel: `master.perform(left.init(), right.init())`.
+
+        The method returns when all operations have ended.
 
         Raises:
-            DriveFailed: a drive did not complete its operation in time.
-            LinkClosed: the bus is gone.
+            DriveFailed: a drive did not complete its operation in time, or reported an error.
+            LinkClosed: the connection to the bus is lost.
         """
         try:
             self._step(self.now_us)  # so that no time-out counts from the last call of this master
@@ -151,10 +157,14 @@ class CanopenMaster(Closing):
                 operation.close()
 
     def explain(self, name: str | int) -> str:
-        """Return a text about the latest boot-up and the losses of a slave, line by line.
+        """Return a text that explains the latest boot-up of a slave, and when the slave was lost.
 
-        The lines on the boot-up contain the requests, the answers and the outcome. Losses, and
-        messages after a loss, are listed in the order of time, before or after the boot-up.
+        There is one line for each request of the boot-up, with its answer, and one for the outcome.
+        Losses of the slave, and messages after a loss, are listed before or after the boot-up, in
+        the order of time.
+
+        Args:
+            name: name or node-ID of the slave.
         """
         slave = self.slave(name)
         steps, events = slave.steps, slave.events
@@ -230,12 +240,13 @@ SDO_TIMEOUT_US: Final = 100_000
 def open_master(
     link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
 ) -> CanopenMaster:
-    """Return the master of a bus.yml. The master has not sent anything yet.
+    """Return the CANopen master that a bus.yml describes. It has not sent any frame yet.
 
     Args:
         link: connection to the bus, such as `bench.link` or `CanLink.open("can0", "socketcan")`.
         path: path of the bus.yml.
-        sdo_timeout_us: time to wait for an SDO response. Use a longer time on a loaded machine.
+        sdo_timeout_us: time to wait for an SDO response, in microseconds. Use a longer time on a
+            loaded machine.
 
     Returns:
         The master. Close it, or use it in a `with` block.

@@ -10,11 +10,11 @@ from tickrig.host.canopen.master.assignment import MasterPlan, ObjectWrite, Slav
 
 
 def plan_of(bus: BusFile) -> MasterPlan:
-    """Return the behaviour of the master in a bus.yml.
+    """Return the settings of the master and its slaves that a bus.yml describes.
 
     Raises:
-        ValueError: the bus.yml has no master.
-        OSError: software that the bus.yml names cannot be read.
+        ValueError: the bus.yml has no section for a master.
+        OSError: a software file that the bus.yml names cannot be read.
     """
     master = bus.master
     if master is None:

@@ -22,11 +22,11 @@ from tickrig.wire.instant import NEVER
 
 
 class ProcessData:
-    """Distributor of frames and SYNCs to the process images and drives of the nodes.
+    """Process data of all slaves, to which the master gives the received frames and the SYNCs.
 
     Args:
-        images: process images by node-ID.
-        drives: nodes with the axes of drives.
+        images: process image of each slave, by node-ID.
+        drives: nodes with drive axes.
     """
 
     def __init__(
@@ -52,10 +52,14 @@ class ProcessData:
             image.sync()
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Start the periods that are due. `sync` is whether a SYNC was just sent.
+        """Read and write the drives whose period begins now.
 
-        No period starts while slaves boot at the start, because the drivers of ros2_canopen wait
-        for the slaves.
+        No period begins before the slaves have booted for the first time, because the drivers of
+        ros2_canopen wait for them.
+
+        Args:
+            now_us: current time in microseconds.
+            sync: whether a SYNC was just sent.
         """
         if not self._began:
             if any(drive.is_awaited(now_us) for drive in self.drives):
@@ -117,7 +121,7 @@ class NmtMaster:
         return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Process received frames, do the work that is due, and return the frames to send."""
+        """Process received frames, and do the work that is due. Return the frames to send."""
         self.now_us = now_us
         if self.state is nmt.NmtState.INITIALISING:
             self._start_up()

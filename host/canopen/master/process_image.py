@@ -22,15 +22,16 @@ _SYNC_ACYCLIC: Final = 0
 
 
 class ProcessImage:
-    """Values in the PDOs of a slave, by index and sub-index; 0 until received or written.
+    """Values of the objects in the PDOs of one slave, as the master has received or written them.
 
-    An RPDO of the slave is sent when an object in it is written. A synchronous RPDO is sent with
-    each n-th SYNC. As in Lely's master, objects that have not been written are 0.
+    Values are 0 until they are received or written. When an object is written, the RPDO that
+    contains it is sent. A synchronous RPDO is sent with each n-th SYNC instead. As in Lely's
+    master, objects that have not been written are sent as 0.
 
-    Not emulated: inhibit times, event timers and deadlines of the master.
+    The inhibit times, event timers and deadlines of the master are not emulated.
 
     Args:
-        pdos: existing PDOs of the slave.
+        pdos: PDOs that the slave has.
         send: function that sends a data frame. Its arguments are CAN-ID and data.
     """
 

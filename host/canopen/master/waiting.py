@@ -9,12 +9,13 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """Wait until a condition holds.
+    """Awaitable with which an operation of a drive waits until a condition holds.
 
     Attributes:
         done: function that returns whether the condition holds.
-        within_us: time limit.
-        complaint: message of the `DriveFailed` error that is raised after this time.
+        within_us: time limit in microseconds.
+        complaint: message of the `DriveFailed` error if the condition does not hold within the time
+            limit.
     """
 
     done: Callable[[], bool]
@@ -74,10 +75,11 @@ def perform(
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
-    """Run operations to their ends, in parallel.
+    """Run several operations of drives in parallel, until all have ended.
 
     Raises:
-        DriveFailed: a condition did not hold in time. The other operations stop where they are.
+        DriveFailed: a condition for which an operation waits did not hold in time. The other
+            operations stop where they are.
     """
     waits = [_Wait(operation, now_us()) for operation in operations]
     while waits := [wait for wait in waits if wait.step is not None]:

@@ -30,7 +30,7 @@ class Baseline:
 
     @classmethod
     def read(cls, path: Path) -> Baseline:
-        """Read a baseline from a file.
+        """Read a baseline file, which lists the checks whose failures are known.
 
         Raises:
             OSError: the file cannot be read.
@@ -65,7 +65,10 @@ class Baseline:
         return report.exit_status_with(len(self.new(report)))
 
     def ends_with(self, report: verdict.Report) -> int:
-        """Return the exit status of the command. If the run ended early, the reason decides."""
+        """Return the exit status of `canmon conform`, in which known failures do not count.
+
+        If the run ended early, the reason decides: Ctrl-C, or a failure of the bus.
+        """
         if report.aborted and not report.absent:
             return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED
         return self.exit_status(report)
@@ -75,7 +78,7 @@ NONE_KNOWN: Final = Baseline()
 
 
 def baseline_text(report: verdict.Report) -> str:
-    """Write the failures of a report as a baseline, in the order of their ids."""
+    """Return a baseline file that lists all failures of a report as known, by check id."""
     failed = {
         result.check.id: f"{result.check.id}  # {one_line(result.check.title)}"
         for result in report.with_verdict(verdict.CheckVerdict.FAIL)

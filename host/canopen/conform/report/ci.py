@@ -21,9 +21,9 @@ _CHARACTER: Final = 7
 
 
 def badge(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return an SVG badge with the number of passed checks.
+    """Return an SVG badge for a README that shows how many checks passed, such as `77 of 78 pass`.
 
-    The badge is red if a failure is new.
+    The badge is red if a failure is not in the baseline.
     """
     judged = [report.count(verdict) for verdict in (CheckVerdict.PASS, CheckVerdict.FAIL)]
     text = f"{judged[0]} of {sum(judged)} pass" if any(judged) else "nothing judged"
@@ -61,14 +61,14 @@ def report_junit(
     baseline: Baseline = NONE_KNOWN,
     show: overview.ShowFrames = overview.plain_frames,
 ) -> str:
-    """Return the JUnit report.
+    """Return a conformance report as JUnit XML for CI systems.
 
-    A known failure is reported as skipped, a check without a verdict as an error.
+    A known failure is reported as skipped, and a check without a verdict as an error.
 
     Args:
         report: report of the run.
-        baseline: baseline of known failures.
-        show: function that formats frames.
+        baseline: failures that are known.
+        show: function that formats the recorded frames as lines.
     """
     suites = [
         junit.JunitSuite(row.name, [_case(result, baseline, show) for result in row.results])

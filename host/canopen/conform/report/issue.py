@@ -32,14 +32,15 @@ _GROUP: Final = re.compile(r"\(.*\)")
 def issue_text(
     report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return a page with the failures of a report.
+    """Return the failures of a run as a Markdown page, for an issue at the maker of the device.
 
-    For each failure it contains the requirement, the answer, the frames and a script.
+    For each failure it contains the requirement, the answer of the node, the frames, and a script
+    that reproduces the failure.
 
     Args:
         report: report of the run.
-        baseline: baseline of known failures, which are omitted.
-        show: function that formats frames.
+        baseline: failures that are known. The page omits them.
+        show: function that formats the recorded frames as lines.
     """
     failed = baseline.new(report)
     parts = ["\n".join(_head(report, len(failed)))]

@@ -56,7 +56,10 @@ _HINTS: Final[Mapping[str, str]] = {
 
 
 def hint(result: Result) -> str:
-    """Return a hint where the cause may be, without a full stop; empty if there is no hint."""
+    """Return where the user should search for the cause of a failure; empty if there is no hint.
+
+    The text has no full stop.
+    """
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:
             return "the node: it no longer answers; switch it off and on, then run the check alone"
@@ -79,11 +82,11 @@ def plain_frames(lines: Sequence[FrameLine]) -> list[str]:
 
 
 def plain_frame(line: FrameLine, meaning: str = "") -> str:
-    """Format a line.
+    """Format one line of the recorded evidence, with its time and direction.
 
     Args:
-        line: line of the evidence, which is a frame or a remark.
-        meaning: text after a frame, empty if the meaning is unknown.
+        line: frame or remark to format.
+        meaning: decoded meaning, appended to a frame. It is empty if the meaning is unknown.
     """
     seconds, micros = divmod(line.at_us, 1_000_000)
     head = f" ({seconds:03}.{micros:06})  {line.direction}  "
@@ -106,11 +109,7 @@ def frame_of(line: FrameLine) -> CanFrame | None:
 
 
 def cut(lines: list[str], most: int) -> list[str]:
-    """Return the first and last lines if there are more than `most`, and how many are omitted.
-
-    >>> cut(["a", "b", "c", "d", "e"], 3)
-    ['a', '... 3 more lines ...', 'e']
-    """
+    """Shorten a text to `most` lines: its beginning, the number of omitted lines, and its end."""
     if len(lines) <= most:
         return lines
     head, tail = most // 2, most - most // 2 - 1
@@ -119,9 +118,9 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
-    """Return the evidence of a check as lines of text.
+    """Return the evidence of a check as lines of text: of both attempts, if the check was repeated.
 
-    The lines of the first attempt come before those of the second, if the attempts differ.
+    If the frames of both attempts are the same, they are shown once.
     """
     if first is None:
         return show(outcome.evidence)
@@ -177,7 +176,7 @@ def counts_text(counts: dict[CheckVerdict, int]) -> str:
 
 
 def by_group(report: Report) -> list[_GroupRow]:
-    """Return a table row for each group, in the order in which the groups first occur."""
+    """Return one table row per group of checks, with its results, in the order of the run."""
     return _rows(report, lambda result: result.check.group)
 
 
@@ -194,9 +193,10 @@ def unwell(report: Report) -> list[Result]:
 
 
 def causes(results: Iterable[Result]) -> list[list[Result]]:
-    """Put object checks that fail in the same way into one list.
+    """Combine results that probably have the same cause, so that a report shows the cause once.
 
-    Each other check gets a list of its own.
+    Object checks of the same kind that fail for the same reason are in one list. Each other result
+    is in a list of its own.
     """
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):

@@ -35,12 +35,12 @@ _MOST_OPEN: Final = 12
 def html_page(
     report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the report as an HTML page. The same run gives the same bytes.
+    """Return a conformance report as one HTML page. The same report gives the same bytes.
 
     Args:
         report: report of the run.
-        baseline: baseline of known failures.
-        show: function that formats frames.
+        baseline: failures that are known.
+        show: function that formats the recorded frames as lines.
     """
 
     def frames(outcome: CheckOutcome) -> str:

@@ -18,11 +18,11 @@ _Object = dict[str, object]
 
 
 def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return the report as JSON. The same run gives the same bytes.
+    """Return a conformance report as JSON for programs. The same report gives the same bytes.
 
     Args:
         report: report of the run.
-        baseline: baseline of known failures.
+        baseline: failures that are known.
     """
     said: _Object = {
         "v": _VERSION,

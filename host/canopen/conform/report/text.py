@@ -27,14 +27,14 @@ def text_report(
     show: overview.ShowFrames = overview.plain_frames,
     again: str = "",
 ) -> str:
-    """Return the report as text.
+    """Return a conformance report as text for the terminal.
 
     Args:
         report: report of the run.
-        baseline: baseline of known failures. Only their names are shown.
-        show: function that formats frames.
-        again: command that runs one check alone, without the id of the check, or an empty text if
-            there is none.
+        baseline: failures that are known. Only their names are shown.
+        show: function that formats the recorded frames as lines.
+        again: command line that runs a single check again, without the check's id at its end. If it
+            is empty, no such command is shown.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in overview.unwell(report) if not baseline.knows(result)]

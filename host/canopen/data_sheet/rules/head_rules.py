@@ -41,7 +41,7 @@ _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber"
 
 
 def number(document: Document, section: str, key: str) -> int | None:
-    """Return the number of a keyword, or None if it is not a 32-bit number."""
+    """Return the number at a keyword of a section, or None if it is not a 32-bit number."""
     found = eds_number(document.file.value(section, key))
     return None if found is None or found.bit_length() > _WIDEST else found
 
@@ -181,7 +181,7 @@ def comment_lines(document: Document) -> Iterator[RuleFinding]:
 
 
 def commissioning(document: Document) -> Iterator[RuleFinding]:
-    """Find keywords that a DCF needs but lacks, and keywords that an EDS must not have."""
+    """Find commissioning keywords that a DCF lacks, or that an EDS must not have."""
     file, title = document.file, "DeviceComissioning"
     if document.name.lower().endswith(".dcf") and title not in file.sections:
         yield document.found("commissioning-missing", f"the DCF has no [{title}]")

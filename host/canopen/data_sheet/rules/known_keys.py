@@ -92,13 +92,7 @@ _COUNTED: Final = re.compile(r"NrOfEntries|Lines|ProductVersion|ProductRevision"
 
 
 def is_number(section: str, key: str) -> bool:
-    """Return whether the value of a keyword is a number, for any data type of its object.
-
-    >>> is_number("DeviceInfo", "VendorNumber"), is_number("1600Value", "NrOfEntries")
-    (True, True)
-    >>> is_number("DeviceInfo", "VendorName"), is_number("1017", "DefaultValue")
-    (False, False)
-    """
+    """Return whether the value of a keyword is a number, whatever the object's data type is."""
     if object_section(section) is not None or is_module_object(section):
         return key.lower() in _OBJECT_NUMBERS
     if (known := _NUMBERS.get(section)) is not None:
@@ -109,7 +103,10 @@ def is_number(section: str, key: str) -> bool:
 
 
 def keys_of(section: str) -> dict[str, str] | None:
-    """Return the keywords of a section by their lower case, or None if any keyword is allowed."""
+    """Return the keywords that CiA 306 allows in a section, by their lower case.
+
+    The result is None if the section may have any keyword.
+    """
     if object_section(section) is not None:
         return _OBJECT
     if is_module_object(section):
@@ -118,10 +115,9 @@ def keys_of(section: str) -> dict[str, str] | None:
 
 
 def numbered(section: str, key: str) -> str | None:
-    """Return the spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`, or None.
+    """Return the correct spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`.
 
-    >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
-    ('Line5', 'Dummy001B', None)
+    The result is None if the section has no such keywords.
     """
     pattern = _KEYS.get(section)
     if pattern is None or not pattern.fullmatch(key):

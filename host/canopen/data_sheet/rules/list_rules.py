@@ -27,12 +27,12 @@ _INDICES: Final = range(0x1000, 0x10000)
 
 
 class ObjectList:
-    """One list of objects.
+    """List of objects in an EDS: mandatory, optional or manufacturer-specific objects.
 
     Attributes:
-        title: title of the list's section.
-        entries: index by line, in the order of the file. The value is None if the text is not an
-            index.
+        title: title of the section that contains the list.
+        entries: each line of the list with its object index. The index is None if the value is not
+            an index.
     """
 
     def __init__(self, document: Document, title: str) -> None:

@@ -53,9 +53,9 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 
 
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Compare SubNumber with the existing sub-indices.
+    """Find objects whose SubNumber differs from the number of their sub-index sections.
 
-    If a sub-index seems to be missing, SubNumber is not fixed, so that this stays visible.
+    If a sub-index seems to be missing, SubNumber is not corrected, so that the error stays visible.
     """
     file = document.file
     for section, index, sub in file.objects():
@@ -122,7 +122,7 @@ def _section_of(row: EntryDescription) -> Iterator[str]:
 
 
 def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
-    """Return the edits that write each entry of a compact object as its own section."""
+    """Return the edits that replace CompactSubObj of an object by one section per sub-index."""
     place = object_section(section)
     known = all(document.file.value(section, key) for key in ("DataType", "AccessType"))
     if place is None or not known:

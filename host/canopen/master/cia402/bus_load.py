@@ -32,9 +32,9 @@ _Load = float
 
 
 def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return a finding if the periods of the drives load the bus too much.
+    """Return a warning if the PDOs and SDO polling of the drives in a bus.yml overload the bus.
 
-    The length of the frames is computed exactly in bits, with data bytes of 0.
+    The number of bits of each frame is computed exactly, with data bytes of 0.
     """
     notes, master = BusFileNotes(), bus.master
     if master is not None:

@@ -39,13 +39,13 @@ _SWITCHING_STATES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """The settings of an axis.
+    """Settings of one drive axis, as in the bus.yml.
 
     Attributes:
-        channel: channel with name, scales and offsets of the axis.
+        channel: name of the joint, and scales and offsets of its values.
         axis: number of the axis. 0 is the first axis of the device.
-        switching_state: state in which the mode is changed.
-        homing_us: longest duration of homing.
+        switching_state: state of the drive (CiA 402) in which its mode of operation is changed.
+        homing_us: longest duration of homing, in microseconds.
     """
 
     channel: DriveChannel
@@ -55,7 +55,7 @@ class DriveSettings:
 
 
 def is_drive(slave: BusSlave) -> bool:
-    """Return whether a slave is operated as a drive, by its driver or else by its device type."""
+    """Return whether a slave is a drive, by its driver in the bus.yml or its device type."""
     if slave.driver:
         return "402" in slave.driver
     return slave.identity.device_type & 0xFFFF == _DRIVE_PROFILE
@@ -72,7 +72,10 @@ def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
 
 
 def period_us_of(slave: BusSlave) -> int:
-    """Return the period in which ros2_canopen polls a node, or 0 if it polls with each SYNC."""
+    """Return the period in microseconds in which ros2_canopen reads and writes a drive.
+
+    The result is 0 if this is done with each SYNC.
+    """
     if not _number(slave, "polling", 1):
         return 0
     return 1_000 * _number(slave, "period", _PERIOD_MS)
@@ -101,13 +104,14 @@ _ERROR: Final = Statusword.MODE_13
 async def home(
     name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
-    """Start homing in a drive that is in homing mode. Wait for the end of homing.
+    """Start the homing of a drive, and wait until it ends. The drive must be in homing mode.
 
     Args:
-        name: name of the joint.
-        mode: mode object of the drive.
-        within_us: longest duration of homing.
-        caught_up: operation that waits for a statusword that was sent after the controlword.
+        name: name of the joint, for messages.
+        mode: homing mode of the drive.
+        within_us: longest duration of homing, in microseconds.
+        caught_up: function that returns an operation. It waits for a statusword that the drive sent
+            after it received the latest controlword.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
@@ -198,9 +202,9 @@ class DriveDriver:
 
     @property
     def state(self) -> DriveState | None:
-        """The state in the statusword, or None until a statusword was read after the node booted.
+        """State of the drive (CiA 402) in its last statusword.
 
-        The state becomes None when the node is lost, until a statusword arrives.
+        The state is None as long as no statusword has arrived since the node booted or was lost.
         """
         return state_of(self.statusword) if self._known else None
 
@@ -226,11 +230,13 @@ class DriveDriver:
         return self._value(_TORQUE) * self._channel.scale_eff_from_dev
 
     def set_target(self, target: float) -> None:
-        """Set a set-point for the current mode, in units of the user. A torque is in per mille.
+        """Set the target position, speed or torque of the drive, depending on its mode.
+
+        A position or speed is in units of the user, a torque in per mille of the rated torque.
 
         Raises:
-            DriveFailed: the drive is not in Operation enabled.
-            ValueError: the target is not a number, or the mode has no target.
+            DriveFailed: the drive is not in the state Operation enabled.
+            ValueError: the target is not a number, or the current mode has no target.
         """
         if not hasattr(target, "__float__"):
             raise ValueError(f"{self.name}: {target!r} is not a target: expected a number")
@@ -273,10 +279,12 @@ class DriveDriver:
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
-        """Enable the drive, and home it if its homing method is not 0. The drive then has no mode.
+        """Enable the drive. If it has a homing method (6098h is not 0), also do the homing.
+
+        Afterwards no mode of operation is selected.
 
         Raises:
-            DriveFailed: the drive does not complete in time.
+            DriveFailed: the drive is not enabled in time, or homing fails.
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault, self._unseen = 0, True, True
@@ -298,23 +306,24 @@ class DriveDriver:
         await self.switch_to(DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
-        """Do a quick stop. A drive that is not in Operation enabled stays as it is."""
+        """Stop the drive by a quick stop, if it is in the state Operation enabled."""
         state = state_of(self.statusword)
         word = drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
         if word is not None:
             self.controlword, self._unseen = word, True
 
     async def switch_to(self, goal: DriveState | str) -> None:
-        """Bring the drive to a state.
+        """Bring the drive to a state of CiA 402.
 
-        Operation enabled is reached step by step, other states directly.
+        The state Operation enabled is reached through the states before it. Other states are
+        reached only by a single transition.
 
         Args:
-            goal: state, or name of the state, such as `Switched on`.
+            goal: wanted state, or its name, such as `Switched on`.
 
         Raises:
-            ValueError: the state does not exist.
-            DriveFailed: no transition leads to the state, or the change takes too long.
+            ValueError: there is no state with this name.
+            DriveFailed: no transition leads to the state, or the drive does not reach it in time.
         """
         goal = drive_state.state_named(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
@@ -334,15 +343,15 @@ class DriveDriver:
         await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
-        """Change the mode of operation. The drive then has no target, and is halted.
+        """Select the mode of operation. Afterwards the drive has no target, and is halted.
 
         Args:
             mode: number of the mode, or its abbreviation: `pp`, `vl`, `pv`, `tq`, `hm`, `ip`,
                 `csp`, `csv`, `cst`, `none`.
 
         Raises:
-            ValueError: the mode does not exist.
-            DriveFailed: the drive does not have this mode, or does not report it in time.
+            ValueError: there is no such mode.
+            DriveFailed: the drive does not support this mode, or does not report it in time.
         """
         number = drive_mode.ModeNumber.of(mode)
         if number is drive_mode.ModeNumber.NONE:
@@ -449,18 +458,19 @@ _AWAITED_US: Final = 3_000_000
 
 
 class DriveNode:
-    """Drive node that runs its axes in turn, in each period while the node is booted.
+    """A CANopen node with one or more drive axes, which are read and written in each period.
 
-    A period is skipped while SDO transfers of the previous period still run.
+    This starts when the node has booted. A period is skipped while SDO transfers of the previous
+    period are still running.
 
     Args:
-        slave: slave that is the node.
-        image: values in the PDOs of the node.
+        slave: slave that represents the node at the master.
+        image: values of the PDOs of the node.
         axes: settings of each axis.
-        period_us: period, or 0 for once with each SYNC.
+        period_us: period in microseconds. 0 stands for once per SYNC.
 
     Attributes:
-        drivers: drivers of the axes, one per axis.
+        drivers: driver of each axis.
     """
 
     def __init__(
@@ -490,10 +500,10 @@ class DriveNode:
         return self._slave.booting and now_us - self._slave.began_us < _AWAITED_US
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Start a period, if a period is due.
+        """Read and write the axes, if a new period begins.
 
         Args:
-            now_us: current time.
+            now_us: current time in microseconds.
             sync: whether a SYNC was sent just now.
         """
         self._now_us = now_us

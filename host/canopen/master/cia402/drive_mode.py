@@ -34,9 +34,10 @@ class ModeNumber(IntEnum):
 
     @classmethod
     def of(cls, mode: int | str) -> ModeNumber:
-        """Return a mode by its usual abbreviation, such as `pp`.
+        """Return the mode with a number, or with an abbreviation such as `pp` (profile position).
 
-        Raise ValueError if there is none.
+        Raises:
+            ValueError: there is no such mode.
         """
         if isinstance(mode, int) and mode in list(cls):
             return cls(mode)
@@ -62,11 +63,11 @@ _SHORT: Final[Mapping[str, ModeNumber]] = {
 
 @dataclass(frozen=True, slots=True)
 class DriveObject:
-    """An object of a drive.
+    """Object of the drive profile CiA 402, such as the target position, with its size and sign.
 
     Attributes:
-        index: index of the object for the first axis.
-        size: size in bytes.
+        index: index of the object of the first axis.
+        size: size of the value in bytes.
         sub: sub-index of the object.
         signed: whether the data type of the object is a signed INTEGER.
     """
@@ -99,10 +100,10 @@ _Write = Callable[[DriveObject, int], Script[None]]
 
 
 class DriveMode:
-    """The actions of a mode in each period, which are used while the drive is in the mode.
+    """Base class of the modes of operation: how a mode writes its target in each period.
 
     Attributes:
-        controlword: bits of the mode in the controlword (6040h).
+        controlword: bits of the controlword (6040h) that depend on the mode.
     """
 
     def __init__(self) -> None:
@@ -112,17 +113,18 @@ class DriveMode:
         """Clear the set-point, as after a selection of the mode."""
 
     def set_target(self, value: float) -> None:
-        """Set a set-point in units of the device. Raise ValueError if the mode has no set-point."""
+        """Set the target in units of the device, which is written in the next period.
+
+        Raises:
+            ValueError: this mode has no target.
+        """
         raise ValueError("this mode has no target")
 
     def read(self, statusword: int) -> None:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the set-point. Return whether there is one.
-
-        Without a set-point, the drive is halted.
-        """
+        """Write the target to the drive. Return False, so that the drive halts, if there is none."""
         yield from ()
         return False
 
@@ -145,10 +147,10 @@ class _TargetMode(DriveMode):
         self._target = None
 
     def set_target(self, value: float) -> None:
-        """Set a target. A value that is too large for the object is limited.
+        """Set the target in units of the device. A value outside the object's range is limited.
 
         Raises:
-            ValueError: the value is not a number.
+            ValueError: the value is infinite or NaN.
         """
         if not math.isfinite(value):
             raise ValueError(f"{value} is not a target")
@@ -178,7 +180,7 @@ class _ProfilePositionMode(_TargetMode):
         self._acknowledged = bool(statusword & Statusword.MODE_12)
 
     def write(self, write: _Write) -> Script[bool]:
-        """Set bit 4 for a new target. Clear bit 4 when the target is acknowledged."""
+        """Write a new target, and set bit 4 of the controlword until the drive acknowledges it."""
         self.controlword |= _AT_ONCE
         if self._target is None:
             return False
@@ -195,13 +197,13 @@ class _ProfilePositionMode(_TargetMode):
 
 
 class HomingMode(DriveMode):
-    """Mode that starts homing by bit 4.
+    """Homing mode (CiA 402). Bit 4 of the controlword starts homing.
 
-    Statusword bits 10, 12 and 13 report the progress of homing.
+    Bits 10, 12 and 13 of the statusword report the progress.
 
     Attributes:
-        runs: whether homing should run.
-        status: bits 10, 12 and 13 of the statusword.
+        runs: whether homing is requested.
+        status: last values of bits 10, 12 and 13 of the statusword.
     """
 
     MASK: Final = Statusword.TARGET_REACHED | Statusword.MODE_12 | Statusword.MODE_13

@@ -17,7 +17,11 @@ MODE_BITS: Final = 0x0270
 
 
 def state_named(state: DriveState | str) -> DriveState:
-    """Return a state by its name, such as `Switched on`. Raise ValueError if there is none."""
+    """Return a drive state by its name in CiA 402, such as `Switched on`.
+
+    Raises:
+        ValueError: there is no state with this name.
+    """
     by_words = {each.words: each for each in DriveState}
     if isinstance(state, DriveState):
         return state
@@ -74,11 +78,18 @@ _ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
 
 
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
-    """Return the next state on the way to Operation enabled. Other states are reached directly."""
+    """Return the state to which a drive must switch next on its way to a wanted state.
+
+    Only Operation enabled is reached through other states. For any other wanted state, the result
+    is this state.
+    """
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
 
 def lead(controlword: int, state: DriveState | None, following: DriveState) -> int | None:
-    """Return the controlword that leads from a state to another, or None if there is none."""
+    """Return the controlword that switches a drive from one state to the following one.
+
+    The result is None if CiA 402 has no such transition.
+    """
     bits = None if state is None else TRANSITIONS.get((state, following))
     return None if bits is None else controlword & ~int(bits[1]) | int(bits[0])
