@@ -73,14 +73,16 @@ _HEIGHT_BITS: Final = 6
 
 
 class LineView(ScrollView, can_focus=True):
-    """A scrollable view of text lines, which repaints only changed lines.
+    """Scrollable Textual view of many lines of text, which repaints only changed lines.
 
-    If there are many lines, the view needs only the lines around the visible ones.
+    The view needs only the lines around the visible ones, and its owner provides others when the
+    user scrolls.
 
     Attributes:
-        lines: lines that the view has.
-        begin: number of the first line in `lines`, counted from 0.
-        follows: whether the last line stays visible, because the user has not scrolled up.
+        lines: lines that the view has at the moment.
+        begin: number of the first of these lines, counted from 0.
+        follows: whether the view scrolls to each new last line, because the user has not scrolled
+            up.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
@@ -118,12 +120,12 @@ class LineView(ScrollView, can_focus=True):
         return max(0, self._total - self.rows)
 
     def show(self, lines: Sequence[Line], begin: int = 0, total: int | None = None) -> None:
-        """Show lines.
+        """Show these lines in the view.
 
         Args:
-            lines: lines that the view gets.
-            begin: number of the first line in `lines`.
-            total: number of all lines. By default, it is the number of `lines`.
+            lines: lines that the view gets, which may be a part of all lines.
+            begin: number of the first of these lines, counted from 0.
+            total: total number of lines. By default, it is the number of `lines`.
         """
         before, was = self.lines, self.begin
         self.lines, self.begin = list(lines), begin
@@ -178,12 +180,14 @@ class LineView(ScrollView, can_focus=True):
         return strip
 
     def line_at(self, number: int) -> Line:
-        """Return a line by its number. The line is empty if the view does not have it."""
+        """Return a line by its number. The result is empty if the view does not have this line."""
         return _at(self.lines, number - self.begin)
 
 
 def rounded_up(total: int) -> int:
-    """Round a height up, so that it seldom changes while lines arrive. A new layout takes long.
+    """Round the height of a view up, so that it seldom changes while lines arrive.
+
+    Each change needs a new layout, which takes long.
 
     >>> rounded_up(50), rounded_up(1_001), rounded_up(100_000)
     (50, 1008, 100352)
@@ -193,7 +197,7 @@ def rounded_up(total: int) -> int:
 
 
 def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
-    """Return the visible part of a line, from a column on, padded to a width."""
+    """Return the visible part of a line as a Textual strip, from a column on, padded to a width."""
     if line_width(line) != len(line_text(line)):
         whole = Strip([Segment(in_cells(text), _style_on(base, style)) for text, style in line])
         return whole.crop(left, left + width).adjust_cell_length(width, base)
@@ -220,12 +224,12 @@ def _at(lines: Sequence[Line], place: int) -> Line:
 
 
 class Key(NamedTuple):
-    """A key in the footer.
+    """One key of the keyboard that the footer shows, with its action.
 
     Attributes:
         name: name of the key in Textual.
-        shown: displayed name of the key.
-        description: description of the key's action.
+        shown: name of the key in the footer.
+        description: description of the action.
     """
 
     name: str
@@ -239,9 +243,9 @@ class Key(NamedTuple):
 
 
 def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
-    """Distribute the keys over lines of a given width, with a blank between two keys.
+    """Distribute the keys of a footer over as many lines as needed, without cutting any.
 
-    All keys are shown in full.
+    Keys are separated by a blank. The lines have the given width.
     """
     rows: list[list[Key]] = [[]]
     left = width
@@ -255,7 +259,7 @@ def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
 
 
 def key_at(row: Iterable[Key], column: int) -> Key | None:
-    """Return the key at a column of a line, or None between two keys and after the last key."""
+    """Return the key at a column of a footer line, or None if there is none at this column."""
     for key in row:
         if 0 <= column < len(key.text):
             return key
@@ -264,9 +268,9 @@ def key_at(row: Iterable[Key], column: int) -> Key | None:
 
 
 class KeyFooter(Widget):
-    """A footer that shows all bound keys that are not hidden. A click on a key presses it.
+    """Footer that shows all keys of an app in several lines. A click on a key acts like the key.
 
-    The footer of Textual has one line, and cuts keys that do not fit.
+    Hidden keys are not shown. The footer of Textual has one line, and cuts keys that do not fit.
     """
 
     COMPONENT_CLASSES = {"keyfooter--key"}  # noqa: RUF012 - Textual's name, never changed
@@ -355,12 +359,11 @@ _HARMLESS: Final = _Harmless()
 
 
 class FramedApp(App[None]):
-    """An app with a frame and help. F1 shows and hides the help, and Escape hides it.
+    """Base class of the full-screen panels: a Textual app with a frame, a footer of keys, and help.
 
-    The keys q, Ctrl-Q and Ctrl-C, and signals, end the app.
-
-    Ctrl-Q and Ctrl-C work everywhere, also while a question is on the screen. The app also ends if
-    the terminal is gone.
+    F1 shows and hides the help, and Escape hides it. The keys q, Ctrl-Q and Ctrl-C end the app, and
+    so do signals and a lost terminal. Ctrl-Q and Ctrl-C also work while a question is on the
+    screen.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -377,12 +380,12 @@ class FramedApp(App[None]):
 
     @contextmanager
     def ended_by_signals(self) -> Iterator[None]:
-        """Make signals in the block end only the app, so that the code after the app still runs."""
+        """Context manager in which a signal ends the app only. The code after it still runs."""
         with stopped_by_signals(self.end):
             yield
 
     def end(self) -> None:
-        """End the app, from a signal handler or another thread, also before it has started."""
+        """End the app. Signal handlers and other threads may call this, also before its start."""
         self._ended = True
         if self._events is not None and not self._events.is_closed():
             self._events.call_soon_threadsafe(self.exit)

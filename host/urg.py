@@ -15,14 +15,16 @@ from tickrig.wire.errors import WireError
 
 @dataclass(frozen=True, slots=True)
 class UrgScan:
-    """The distances that a laser scanner measured in one turn.
+    """Distances that a laser scanner (URG) measured in one turn of its mirror.
 
     Attributes:
-        time_ms: timer of the sensor at the start of the turn, 24 bits.
-        first: step of the first distance.
-        cluster: number of steps for each distance.
-        distances_mm: distances in mm as received. A value below DMIN is a code, not a distance.
-        specification: specification of the sensor with limits and steps.
+        time_ms: time stamp of the sensor at the start of the turn, in milliseconds. It has 24 bits,
+            so it wraps.
+        first: measurement step (direction) of the first distance.
+        cluster: number of steps that are combined into one distance.
+        distances_mm: distances in mm as received. A value below DMIN is an error code, not a
+            distance.
+        specification: limits and number of steps of the sensor.
     """
 
     time_ms: int
@@ -32,7 +34,11 @@ class UrgScan:
     specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
-        """Return the direction of a distance by its number. Left of straight ahead is positive."""
+        """Return the direction of a distance in radians. 0 is straight ahead, and left is positive.
+
+        Args:
+            place: number of the distance in `distances_mm`, from 0.
+        """
         step = self.first + place * self.cluster + (self.cluster - 1) / 2
         return (step - self.specification.front) * tau / self.specification.resolution
 
@@ -52,21 +58,21 @@ _LEAVE_ADJUST: Final = "2"
 
 
 class UrgClient:
-    """A client of a laser scanner, which starts continuous measurement and receives scans.
+    """Client of a laser scanner (URG) that starts continuous measurement and receives the scans.
 
-    The client first sends SCIP2.0, which switches a sensor from SCIP 1.1. It then sends TM2 and QT
-    to stop a measurement that an earlier host has started. If no valid scan arrives within the time
-    of five scans, the client starts again. A garbled scan is skipped.
+    The client first sends SCIP2.0, which switches a sensor from SCIP 1.1 to 2.0. It then sends TM2
+    and QT to stop a measurement that an earlier host has started. If no valid scan arrives within
+    the time of five scans, the client starts again. A garbled scan is skipped.
 
     Args:
-        link: line to the sensor.
-        cluster: number of steps per distance, 1..99.
+        link: serial line to the sensor.
+        cluster: number of measurement steps that are combined into one distance, 1..99.
         interval: number of scans that are skipped after each scan, 0..9.
 
     Attributes:
-        specification: specification that the sensor sent, or None before it arrives.
+        specification: specification that the sensor has sent, or None before it arrives.
         garbled: number of garbled replies and scans.
-        restarts: number of restarts.
+        restarts: number of times the client has started again.
     """
 
     def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:
@@ -81,11 +87,11 @@ class UrgClient:
         return self._spoilt + self._splitter.garbled
 
     def poll(self) -> list[UrgScan]:
-        """Return the scans that have arrived.
+        """Return the scans that have arrived since the last call, without waiting.
 
         Raises:
-            LinkClosed: the line is gone.
-            DeviceRefused: the sensor reports a fault, or cannot do what was requested.
+            LinkClosed: the connection to the sensor is lost.
+            DeviceRefused: the sensor reports a fault, or refuses the requested measurement.
         """
         scans, data = [], self._link.receive(0)
         for reply in self._splitter.push(data):

@@ -62,7 +62,7 @@ class BusOptions:
 
 
 def parse_bit_rate(text: str) -> int:
-    """Read a bit rate such as 500000, 500k or 1M.
+    """Parse a bit rate of the command line, such as 500000, 500k or 1M. Return it in bit/s.
 
     Raises:
         ValueError: the text is not a bit rate.
@@ -90,7 +90,7 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
 
 
 class BusCommand(HarmlessCommand):
-    """A command in which `--timing` and `--bus-kwargs` accept several words KEY=VALUE.
+    """Click command whose options `--timing` and `--bus-kwargs` accept several words KEY=VALUE.
 
     Do not use this class for a command whose own arguments have the form KEY=VALUE.
     """
@@ -179,16 +179,18 @@ fd_options: Final[Decorator] = add_options(
 def bus_and_rest(
     words: Sequence[str], channel: str | None, rest: str, most: int | None = None
 ) -> tuple[str | None, list[str]]:
-    """Separate the argument BUS of a command from the words after it. With -c, there is no BUS.
+    """Split the arguments of a command into the bus and the words after it.
+
+    If the option -c names the bus, all arguments are words after it.
 
     Args:
         words: arguments of the command.
-        channel: value of -c, or None.
-        rest: name of the words after BUS, for messages.
-        most: maximum number of words after BUS.
+        channel: value of the option -c, or None if it is not given.
+        rest: name of the words after the bus, for error messages.
+        most: maximum number of words after the bus, or None for any number.
 
     Returns:
-        The BUS, or None if -c names the bus, and the remaining words.
+        The bus, or None if -c names it, and the words after the bus.
 
     Raises:
         click.UsageError: an argument is missing, or there are too many.
@@ -203,17 +205,18 @@ def bus_and_rest(
 
 
 def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
-    """Open a bus as a python-can object.
+    """Open the CAN bus that the command line names, as a python-can object.
 
     Args:
-        options: options of the bus.
-        instead: words that the user can give instead of a bus, used in the message.
+        options: bus options of the command line.
+        instead: other arguments that the user can give instead of a bus, for the message.
 
     Returns:
         The bus, its interface and its channel.
 
     Raises:
-        Refused: no bus is given. SourceFailed: the bus cannot be opened.
+        Refused: the command line names no bus.
+        SourceFailed: the bus cannot be opened.
     """
     with loading():
         import can  # noqa: PLC0415 - slow

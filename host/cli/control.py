@@ -22,16 +22,16 @@ _NOBODY: Final = (FileNotFoundError, ConnectionRefusedError)
 
 
 def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
-    """Send one request to a control socket and return the answer.
+    """Send a request to a running emulator or system at its control socket, and return the answer.
 
     Args:
-        socket: control socket of the server.
-        whom: name of the expected server in messages, `emulator` or `system`.
+        socket: path of the control socket.
+        whom: name of the server in error messages, `emulator` or `system`.
         do: verb of the request.
-        fields: other fields of the request.
+        fields: further fields of the request.
 
     Raises:
-        Refused: the server does not answer, or answers with an error.
+        Refused: the server does not answer, or refuses the request.
     """
     with refused_by(socket, whom), ControlClient(socket) as client:
         return client.request(do, **fields)
@@ -80,15 +80,15 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 def serving_control(
     path: Path, dispatcher: RequestDispatcher, clock: _Waiting
 ) -> Iterator[ControlServer]:
-    """Serve a control socket whenever the clock waits, and yield the server.
+    """Serve a control socket in the block, and yield the server. It works while the clock waits.
 
     Args:
-        path: path of the socket.
-        dispatcher: dispatcher that answers the requests.
+        path: path of the socket to create.
+        dispatcher: dispatcher that executes and answers the requests.
         clock: clock of the run, which serves the socket while it waits.
 
     Raises:
-        Refused: the socket cannot be made.
+        Refused: the socket cannot be created.
     """
     from tickrig.host.control.server import ControlServer  # noqa: PLC0415 - a TAB needs none
 

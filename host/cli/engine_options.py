@@ -28,7 +28,7 @@ _PORT: Final = 2809
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """Address of a name server, or the address at which an ORB listens and peers connect.
+    """TCP address: that of an OpenRTM name server, or the one at which this process accepts peers.
 
     CORBA has no access control. Anyone who can connect to the address can do everything that
     rtshell can do.
@@ -55,12 +55,12 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class OpenRtmOptions:
-    """Settings of a process in an OpenRTM system.
+    """Settings with which a process takes part in an OpenRTM system.
 
     Attributes:
         name_server: address of the name server.
-        endpoint: address at which peers can connect.
-        names: format of component names in the name server.
+        endpoint: address at which this process accepts connections of other components.
+        names: format of the names under which components are registered in the name server.
     """
 
     name_server: Endpoint
@@ -69,11 +69,11 @@ class OpenRtmOptions:
 
 
 def format_name(pattern: str, values: Mapping[str, str]) -> str:
-    """Make the name-server path of a component from a format of OpenRTM's `naming.formats`.
+    """Return the path of a component in the name server, from a format of `naming.formats`.
 
     Args:
-        pattern: format such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
-        values: values by letter.
+        pattern: format of OpenRTM such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
+        values: text for each letter after a percent sign, such as `n`.
 
     >>> format_name("%h.host_cxt/%n.rtc", {"h": "robot", "n": "ConsoleIn0"})
     'robot.host_cxt/ConsoleIn0.rtc'
@@ -152,11 +152,11 @@ ros2_options: Final[Decorator] = add_options(
 
 @dataclass(frozen=True, slots=True)
 class EngineOptions:
-    """Engines requested on a command line.
+    """Other middleware to which the user connects a system on the command line.
 
     Attributes:
-        openrtm: settings of OpenRTM, or None.
-        ros2: settings of ROS 2, or None.
+        openrtm: settings of OpenRTM, or None if it is not requested.
+        ros2: settings of ROS 2, or None if it is not requested.
     """
 
     openrtm: OpenRtmOptions | None = None
@@ -168,14 +168,16 @@ class EngineOptions:
 
 
 def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
-    """Move the options of engines out of the options of a command, and return their settings.
+    """Move the options of OpenRTM and ROS 2 out of the options of a command. Return their settings.
 
     Args:
         options: options of the command line by name.
-        topics: text of the default table of topics. If it is empty, all ports have a topic.
+        topics: text of the command's default table of ports and topics. If it is empty, all ports
+            have a topic.
 
     Raises:
-        Refused: an option belongs to an engine that is not requested, or is invalid.
+        Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 although this is not
+            requested.
     """
     return EngineOptions(_take_openrtm(options), _take_ros2(options, topics))
 
@@ -222,13 +224,15 @@ _LAST_DOMAIN: Final = 232
 
 @dataclass(frozen=True, slots=True)
 class Ros2Options:
-    """Settings of a system in ROS 2.
+    """Settings with which a system takes part in ROS 2.
 
     Attributes:
         domain: DDS domain, 0..232.
-        interface: network interface of this machine, such as eth0, or loopback if it is empty.
-        table: file with the table of ports and topics, or None for the table of the command.
-        topics: text of the table of the command. If it is empty, each port has a topic.
+        interface: network interface of this machine, such as eth0. If it is empty, the loopback
+            interface is used.
+        table: file with the table of ports and topics, or None for the default table of the
+            command.
+        topics: text of the command's default table. If it is empty, each port has a topic.
     """
 
     domain: int = 0

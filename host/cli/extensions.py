@@ -21,17 +21,18 @@ class ExtensionError(ValueError):
 
 @dataclass(frozen=True)
 class ExtensionGroup(Generic[T]):
-    """One group of entry points, with built-in members and members of other packages.
+    """A group of extensions, such as device types: built-in ones, and ones of other packages.
 
-    No module is imported, and no metadata is read, before the first access. Built-in members need
-    no installation. An entry point with the name of a built-in member does not replace that member.
+    Other packages register their extensions as entry points. No module is imported, and no metadata
+    is read, before the first access. A built-in extension needs no installation, and an entry point
+    of the same name does not replace it.
 
     Args:
-        name: name of the group, such as `tickrig.devices`.
-        what: noun for the members in messages, such as `device`.
-        built_in: built-in members by name, in the form `MODULE:NAME`.
-        accepts: function that returns whether an object may be a member.
-        wanted: description of members, such as `a DeviceType`.
+        name: name of the entry point group, such as `tickrig.devices`.
+        what: noun for an extension in messages, such as `device`.
+        built_in: built-in extensions by name, each in the form `MODULE:NAME`.
+        accepts: function that returns whether an object is a valid extension of this group.
+        wanted: description of a valid extension for messages, such as `a DeviceType`.
     """
 
     name: str
@@ -45,10 +46,10 @@ class ExtensionGroup(Generic[T]):
         return [*self.built_in, *sorted({point.name for point in self._foreign()})]
 
     def load(self, name: str) -> T:
-        """Return the member with a name.
+        """Import and return the extension with a name.
 
         Raises:
-            ExtensionError: the name is unknown, or the member cannot be loaded.
+            ExtensionError: there is no extension of this name, or it cannot be loaded.
         """
         if name in self.built_in:
             return self._checked(f"{self.what} {name!r}", self.built_in[name])
@@ -58,17 +59,22 @@ class ExtensionGroup(Generic[T]):
         raise ExtensionError(f"no {self.what} {name!r}; {near(name, self.names())}")
 
     def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Return all members by name. Omit and report members that cannot be loaded.
+        """Import all extensions of the group, and return them by name.
+
+        An extension that cannot be loaded is left out and reported.
 
         Args:
-            notify: function that is called with each report.
+            notify: function that is called with a message about each such extension.
         """
         return {name: self.load(name) for name in self.built_in} | self.load_foreign(notify)
 
     def load_foreign(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Return the members of other packages by name.
+        """Import the extensions of other packages, and return them by name.
 
-        Members that cannot be loaded are omitted and reported.
+        An extension that cannot be loaded is left out and reported.
+
+        Args:
+            notify: function that is called with a message about each such extension.
         """
         members = dict[str, T]()
         for point in self._foreign():

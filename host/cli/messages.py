@@ -30,7 +30,7 @@ class Refused(click.ClickException):
 
 
 class SourceFailed(click.ClickException):
-    """A bus, a file or a disk failed: one line on standard error, and exit status 3."""
+    """Raised if a bus, a file or a disk fails. The command ends with one line and status 3."""
 
     exit_code = 3
 
@@ -46,10 +46,10 @@ def refused_at(option: str) -> Iterator[None]:
 
 @contextmanager
 def failing(*errors: type[Exception]) -> Iterator[None]:
-    """Turn these errors of the block into ClickException (exit status 1).
+    """Context manager that turns errors of its block into a ClickException (exit status 1).
 
-    For an error whose `status` is 3, raise SourceFailed instead. `status` is the exit status of a
-    process that this command started. An error of standard output is not changed.
+    An error whose `status` is 3 becomes SourceFailed instead. Its `status` is the exit status of a
+    process that this command started. An error in writing standard output is not changed.
     """
     try:
         yield
@@ -70,11 +70,11 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 def refusing(
     what: str = "", wrong: type[ValueError] = ValueError, *, path: Path | None = None
 ) -> Iterator[None]:
-    """Turn an error of the block into Refused. An OSError is handled as in `refuse_path`.
+    """Context manager that turns errors of its block into Refused. An OSError gives its path.
 
     Args:
-        what: invalid option or argument, which starts the message.
-        wrong: class of the error, whose text is the message.
+        what: invalid option or argument, with which the message starts.
+        wrong: class of the errors to turn into Refused. Their text follows in the message.
         path: file that is wrong, if the text of the error does not name it.
     """
     try:
@@ -87,9 +87,10 @@ def refusing(
 
 
 def time_us(option: str, word: str) -> int:
-    """Read the time of an option such as `--wait` in microseconds.
+    """Parse the time in an option such as `--wait`. Return it in microseconds.
 
-    Raise Refused if it is invalid.
+    Raises:
+        Refused: the text is not a time.
     """
     from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none
 
@@ -107,9 +108,9 @@ def say(text: str) -> None:
 
 @contextmanager
 def warnings_shown() -> Iterator[None]:
-    """Show warnings of the library on standard error, one line per warning.
+    """Context manager that prints the warnings of the library on standard error, one per line.
 
-    Without this context manager, the library prints no warnings.
+    Without it, the warnings are not printed.
     """
     import logging  # noqa: PLC0415 - slow, and a TAB needs none
 
@@ -132,7 +133,9 @@ def show_findings(findings: Iterable[Finding]) -> None:
 
 @contextmanager
 def until_unread() -> Iterator[None]:
-    """End the block without a message if the reader of standard output has ended, as in `| head`.
+    """Context manager that ends its block without a message if nothing reads standard output.
+
+    An example is a command before `| head`.
 
     Raises:
         SourceFailed: standard output cannot be written, for example because the disk is full.

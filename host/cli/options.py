@@ -60,11 +60,11 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 def refuse_idle(why: str, *names: str) -> None:
-    """Refuse the current command if the user gave options that have no effect.
+    """Refuse the current command if the user gave one of some options, because it has no effect.
 
     Args:
         why: reason why the options have no effect, such as `--jsonl has its own times`.
-        names: names of the parameters.
+        names: parameter names of these options.
     """
     from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
 
@@ -76,7 +76,7 @@ def refuse_idle(why: str, *names: str) -> None:
 
 
 class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type there
-    """One of a list of words. The message about an unknown word suggests the nearest word."""
+    """Option type for one of several words. The message about another word suggests the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read a word."""
@@ -125,9 +125,9 @@ def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 def time_option(option: str, name: str, **attributes: Any) -> Decorator:
-    """Return an option for a time such as `10s`.
+    """Return the decorator of an option for a time such as `10s`.
 
-    The value of the option is in microseconds, or None by default.
+    The command gets the time in microseconds, or None if the option is not given.
     """
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
@@ -153,15 +153,15 @@ run_code_option: Final[Decorator] = click.option(
 
 
 def works_in(path: str) -> Decorator:
-    """Return a decorator for a function that only declares the options of a command.
+    """Return a decorator for a function that declares a command, whose code is imported later.
 
-    The function at `path` does the work of the command. Help and completion need only the options,
-    so the module of this function is imported only when the command runs. The decorated function
-    has the same signature and an empty body.
+    The decorated function has the parameters of the command and an empty body. Another function
+    with the same parameters does the work. Its module is imported only when the command runs,
+    because help and completion do not need it.
 
     Args:
-        path: location of the function that does the work, in the form `MODULE:NAME`. The function
-            returns the exit status. None means 0.
+        path: location of the function that does the work, in the form `MODULE:NAME`. It returns the
+            exit status, or None for 0.
     """
 
     def decorate(described: Callable[..., Any]) -> Callable[..., Any]:
@@ -179,12 +179,12 @@ def works_in(path: str) -> Decorator:
 
 
 class LazyCommand(click.Command):
-    """Placeholder in lists for a command that is not imported yet.
+    """Entry of a command list that stands for a command whose module is not imported yet.
 
     Args:
         name: name of the command.
         path: location of the command, in the form `MODULE:NAME`.
-        short_help: first sentence of the command's help.
+        short_help: first sentence of the command's help, which the list shows.
     """
 
     def __init__(self, name: str, path: str, short_help: str) -> None:
@@ -193,11 +193,12 @@ class LazyCommand(click.Command):
 
 
 class LazyGroup(HarmlessCommand, click.Group):
-    """A group of commands, each imported from its own module only when it is needed.
+    """Click group that imports the module of a subcommand only when the subcommand is needed.
 
     Args:
-        commands: path and short help of each command by name, in the order of the list.
-        attributes: arguments of the click group.
+        commands: location (`MODULE:NAME`) and short help of each subcommand by name, in the order
+            of the list.
+        attributes: further arguments of `click.Group`.
     """
 
     def __init__(self, commands: Mapping[str, tuple[str, str]], **attributes: Any) -> None:

@@ -50,10 +50,10 @@ _Handler = Callable[[int, FrameType | None], None]
 
 
 def start(name: str, path: str) -> None:
-    """Run a command as a console script.
+    """Run a command as a console script: import it, handle its signals and errors, and exit.
 
     Args:
-        name: name that users type.
+        name: name of the command that users type.
         path: location of the command, in the form `MODULE:NAME`.
     """
     command: Any = load(path)
@@ -160,9 +160,9 @@ class _HarmlessStream(io.TextIOWrapper):
 
 
 def paint(stream: TextIO, text: str) -> None:
-    """Write text unchanged: a screen drawn by a command, or output for programs.
+    """Write text to a stream at once, without replacing control characters.
 
-    The text is written at once, and no characters are replaced.
+    The text is a screen that a command draws, or output for programs.
     """
     stream = as_is(stream)
     stream.write(text)
@@ -170,10 +170,7 @@ def paint(stream: TextIO, text: str) -> None:
 
 
 def write_harmless(stream: TextIO, text: str) -> None:
-    """Write text that is known to have no control characters.
-
-    This method is faster than `write`, because the characters are not checked.
-    """
+    """Write text that has no control characters. This is faster than `write`, which checks it."""
     if isinstance(stream, _HarmlessStream):
         io.TextIOWrapper.write(stream, text)
     else:
@@ -188,10 +185,11 @@ def as_is(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Provide the three standard streams in the block, and replace control characters in output.
+    """Context manager that makes the standard streams safe for its block.
 
-    If standard error is a file on a full disk, the command continues. The messages are dropped, and
-    the exit status does not change.
+    Streams that were closed are opened, and control characters in output are replaced. If standard
+    error is a file on a full disk, the command continues. The messages are dropped, and the exit
+    status does not change.
     """
     _open_closed_streams()
     before = sys.stdout, sys.stderr
@@ -214,9 +212,9 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise the error again if it is a write error of standard output.
+    """Raise an error again if it came from writing standard output, so that nothing reports it.
 
-    If the reader has closed the pipe, as before `| head`, the command ends without a message.
+    If the reader has closed the pipe, as before `| head`, the command then ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]
@@ -232,9 +230,10 @@ def load(path: str) -> Any:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Make Ctrl-C end the process at once during the block, when there is nothing to clean up.
+    """Context manager in which Ctrl-C ends the process at once, because nothing needs a clean-up.
 
-    Other handlers of Ctrl-C are kept. Threads are not affected.
+    It is used while modules are imported. If the caller has another handler for Ctrl-C, this
+    handler stays. In other threads than the main one, the context manager does nothing.
     """
     handler = signal.getsignal(signal.SIGINT)
     owner = getattr(handler, "__self__", None)
@@ -250,14 +249,13 @@ def loading() -> Iterator[None]:
 
 
 class Interrupter:
-    """A handler that raises KeyboardInterrupt after a signal, but not during an import.
+    """Signal handler that raises KeyboardInterrupt, but not in the middle of an import.
 
-    An exception in the middle of an import may be lost in a callback of the importer, or leave a
-    module half loaded. Therefore the signal is repeated until the import has ended, for two seconds
-    at most.
+    An exception during an import may be lost in a callback of the importer, or leave a module half
+    loaded. Therefore the signal is repeated until the import has ended, for two seconds at most.
 
     Attributes:
-        pending: number of a signal that is being repeated, or 0 if none is.
+        pending: number of the signal that is being repeated, or 0.
     """
 
     def __init__(self) -> None:
@@ -312,7 +310,7 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 @contextmanager
 def taking_signals(received: _Handler) -> Iterator[None]:
-    """Make Ctrl-C, SIGTERM and SIGHUP call `received`.
+    """Context manager in which Ctrl-C (SIGINT), SIGTERM and SIGHUP call the function `received`.
 
     SIGINT is handled even if it was ignored at the start, because the shell of a script ignores it
     for commands before `&`. SIGHUP stays ignored if it was ignored at the start, because nohup
@@ -330,10 +328,10 @@ def taking_signals(received: _Handler) -> Iterator[None]:
 
 
 def give_up_terminals() -> None:
-    """Drop all further output if the terminal is gone, or accepts no data for half a second.
+    """Drop all further output to a terminal that is gone or accepts no data for half a second.
 
-    A stopped terminal would prevent a command from ending. A `write` that already waits for the
-    terminal keeps waiting.
+    Otherwise a stopped terminal could prevent the command from ending. A `write` that already waits
+    for the terminal keeps waiting.
     """
     for descriptor in (1, 2):
         if sys.platform != "win32" and _is_stuck(descriptor):

@@ -20,14 +20,14 @@ class ControlRefused(ValueError):  # noqa: N818 - what the emulator did
 
 
 class ControlClient:
-    """A connection to a control socket.
+    """Client that sends requests to a running emulator at its control socket.
 
     Args:
-        path: path of the socket.
-        timeout_s: time to wait for an answer.
+        path: path of the control socket.
+        timeout_s: time to wait for each answer, in seconds.
 
     Raises:
-        OSError: no server listens at the path, or the server does not answer.
+        OSError: no emulator listens at the path.
     """
 
     def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
@@ -41,12 +41,12 @@ class ControlClient:
             raise
 
     def request(self, do: str, **fields: object) -> Object:
-        """Make a request and return its answer.
+        """Send a request and return the answer.
 
         Raises:
             ControlRefused: the emulator refused the request.
-            OSError: the emulator does not answer, or has closed the connection.
-            ValueError: the answer is invalid.
+            OSError: the emulator does not answer in time, or has closed the connection.
+            ValueError: the answer is not a valid JSON object.
         """
         request = json.dumps({"v": VERSION, "do": do, **fields})
         self._socket.sendall(request.encode() + b"\n")

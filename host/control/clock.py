@@ -20,13 +20,13 @@ class RealClock:
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, t_us: int, /) -> int:
-        """Sleep until a time. A late rig catches up without skipping ticks.
+        """Sleep until a time. A time that has passed ends the sleep at once: a late rig catches up.
 
         Args:
-            t_us: time since the first wait.
+            t_us: time in microseconds since the first wait.
 
         Returns:
-            The time in us by which the wait ended too late.
+            The delay in microseconds with which the wait has ended.
         """
         if self._start_ns is None:
             self._start_ns = time.monotonic_ns()
@@ -38,11 +38,12 @@ class RealClock:
 
 
 class ServingClock(RealClock):
-    """This machine's monotonic clock, which calls a server of requests while it waits.
+    """Real-time clock that calls a function while it waits, for example to serve a control socket.
 
     Attributes:
-        serve: function that is called with the time in microseconds that it may take. It is called
-            at least once for each wait, so that a run that is late can be stopped.
+        serve: function that is called in each wait. Its argument is the time in microseconds that
+            it may take. It is called at least once per wait, so that a late run can still be
+            stopped.
     """
 
     serve: Callable[[int], None] | None = None

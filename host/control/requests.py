@@ -20,10 +20,13 @@ _NOT_JSON: Final = "the line is not a JSON object"
 
 
 class RequestDispatcher:
-    """A dispatcher that calls the function for a request. An invalid request changes nothing.
+    """Dispatcher that calls a function for each request to a control socket, and makes the answer.
+
+    An invalid request is refused and changes nothing.
 
     Args:
-        verbs: functions by the value of `do` in a request. A function raises ValueError to refuse.
+        verbs: function for each verb, which is the value of `do` in a request. A function raises
+            ValueError to refuse a request.
     """
 
     def __init__(self, verbs: Mapping[str, _Verb]) -> None:
@@ -43,7 +46,7 @@ class RequestDispatcher:
             return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
-        """Return the answer to a request, with the field `ok` and either the result or `error`."""
+        """Execute a request and return its answer, with `ok` and either the result or `error`."""
         head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
@@ -85,7 +88,17 @@ def text_of(request: Mapping[str, object], key: str) -> str:
 
 
 def whole(value: object, key: str, low: int, high: int) -> int:
-    """Return a whole number. Raise ValueError if it is not whole, or not in `low` to `high`."""
+    """Return an integer of a request, after checking its type and range.
+
+    Args:
+        value: value in the request.
+        key: key of the value, for the message.
+        low: lowest allowed value.
+        high: highest allowed value.
+
+    Raises:
+        ValueError: the value is not a whole number, or is out of range.
+    """
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{key} is a whole number, not {short(value)}")
     if not low <= value <= high:

@@ -65,17 +65,18 @@ class _Readable(Protocol):
 
 
 class LineServer:
-    """A server for a listening socket. It works only during calls of `serve`.
+    """Server that answers lines of text of many clients, without threads. It works during `serve`.
 
-    In each round the server answers at most one line of each client. It stops reading requests of a
-    client that does not read its answers.
+    In each round, the server answers at most one line of each client. If a client does not read its
+    answers, the server stops reading its requests.
 
     Args:
         listener: non-blocking listening socket, which the server closes.
-        begin: function that is called for each new client, and returns the handler of its lines.
-        refuse: function that makes an answer with the reason of a refusal.
-        max_line: length of the longest line in bytes.
-        clock: function that returns monotonic time in seconds.
+        begin: function that is called for each new client. It returns the function that answers the
+            lines of this client.
+        refuse: function that returns the answer for a refused line, given the reason.
+        max_line: maximum length of a line in bytes.
+        clock: function that returns a monotonic time in seconds.
     """
 
     def __init__(
@@ -92,11 +93,12 @@ class LineServer:
         self._attached: dict[_Readable, Callable[[], None]] = {}
 
     def attach(self, source: _Readable, ready: Callable[[], None]) -> None:
-        """Also watch another source for data to read.
+        """Also wait for another source in `serve`, and call a function when it can be read.
 
         Args:
-            source: object with a descriptor, which is -1 after closing.
-            ready: function that is called in a round in which the source can be read.
+            source: object with a file descriptor. A descriptor of -1 shows that the source is
+                closed.
+            ready: function that is called when there is data to read.
         """
         self._attached[source] = ready
 
@@ -245,17 +247,16 @@ class _Client:
 
 
 class ControlServer(LineServer):
-    """A server for a control socket. It works only during calls of `serve`.
+    """Server for a control socket, which clients use to control a run. It works during `serve`.
 
     Args:
-        path: path of the socket. A socket left by a killed process is replaced.
-        control: dispatcher that answers the requests.
-        clock: function that returns monotonic time in seconds.
+        path: path at which the socket is created. A socket left by a killed process is replaced.
+        control: dispatcher that executes and answers the requests.
+        clock: function that returns a monotonic time in seconds.
 
     Raises:
-        FileExistsError: another process listens at this path, or the path is a file of another
-            kind.
-        OSError: the socket cannot be made.
+        FileExistsError: another process listens at the path, or a file of another type is there.
+        OSError: the socket cannot be created.
     """
 
     def __init__(

@@ -20,10 +20,10 @@ _MAX_PATH_BYTES: Final = 107
 
 
 def unix_socket() -> socket.socket:
-    """Return a new Unix socket.
+    """Return a new Unix socket, not yet bound or connected.
 
     Raises:
-        OSError: Unix sockets are not supported, because Python has none on Windows.
+        OSError: the system is Windows, where Python has no Unix sockets.
     """
     if sys.platform == "win32":
         raise OSError(errno.EAFNOSUPPORT, "there are no Unix sockets on Windows")
@@ -32,14 +32,14 @@ def unix_socket() -> socket.socket:
 
 
 def listen_at(path: Path) -> socket.socket:
-    """Return a non-blocking listening socket to which only this user may connect.
+    """Return a non-blocking listening socket at a path, to which only this user may connect.
 
-    The socket file of a killed process is replaced.
+    A socket file that a killed process has left is replaced.
 
     Raises:
-        FileExistsError: a live process listens at the path, or the path is not a socket.
+        FileExistsError: another process listens at the path, or the path is not a socket.
         BlockingIOError: another program holds a lock on the folder for more than a second.
-        OSError: the socket cannot be made.
+        OSError: the socket cannot be created.
     """
     listener = unix_socket()
     try:

@@ -74,7 +74,7 @@ def _fd_message(frame: FdFrame, at_us: int) -> can.Message:
 
 
 def to_frame(message: can.Message) -> CanFrame | None:
-    """Convert a python-can message to a CAN frame. Return None for an error frame or CAN FD."""
+    """Convert a python-can message to a CAN frame. For an error or CAN FD frame, return None."""
     if message.is_error_frame or message.is_fd:
         return None
     remote = message.is_remote_frame
@@ -88,10 +88,10 @@ def to_frame(message: can.Message) -> CanFrame | None:
 
 
 def to_fd_frame(message: can.Message) -> FdFrame | None:
-    """Convert a message to a CAN FD frame without validation. Return None for other messages.
+    """Convert a python-can message to a CAN FD frame. For any other frame, return None.
 
-    In an ASC log, python-can reads a CAN FD frame without data as a remote frame, but CAN FD has no
-    remote frames.
+    The frame is not validated, because python-can reads a CAN FD frame without data in an ASC log
+    as a remote frame, although CAN FD has no remote frames.
     """
     if not message.is_fd or message.is_error_frame:
         return None
@@ -112,7 +112,7 @@ _DRIFT: Final = 5_000
 
 
 class StampClock:
-    """A clock that computes the arrival time of a frame from the driver's time stamp.
+    """Converter from time stamps of a CAN driver to arrival times on the clock of this host.
 
     The driver's clock starts at an unknown time (1970, or power-on), and it drifts. A frame is read
     after its arrival. Therefore the smallest difference seen between reading time and time stamp is
@@ -133,12 +133,11 @@ class StampClock:
         self._stamp_us: int | None = None
 
     def at_us(self, stamp_s: float, polled_us: int, now_us: int) -> int:
-        """Return the arrival time of a frame.
+        """Return the arrival time of a frame on the host's clock, in microseconds.
 
         Args:
-            stamp_s: time stamp of the driver, in seconds on the clock of the driver, or 0 without a
-                time stamp.
-            polled_us: time of the last poll without a frame.
+            stamp_s: time stamp of the driver in seconds, or 0 if it gives none.
+            polled_us: time of the last poll that found no frame.
             now_us: time at which the frame was read.
         """
         stamp_us = round(stamp_s * 1e6)
@@ -202,7 +201,7 @@ def _enlarge_queue(sock: socket.socket) -> None:
 
 
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
-    """Prepare a python-can bus: enlarge its queue, and receive only its own multicast group.
+    """Set up a python-can bus: enlarge its receive queue, and filter out foreign multicast groups.
 
     python-can binds the socket of `udp_multicast` only to a port. Linux then delivers data on that
     port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
@@ -293,13 +292,14 @@ class BusReceiver:
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
-        """Return the next message, or None after the timeout, or if the message cannot be read.
+        """Return the next python-can message, or None if none arrives in time or it is invalid.
 
         Args:
-            timeout_s: longest wait in seconds, or None without limit.
+            timeout_s: longest wait in seconds, or None to wait without limit.
 
         Raises:
-            LinkClosed: the bus is gone, or 100 reads in a row failed over 1 s.
+            LinkClosed: the connection to the bus is lost, or 100 reads in a row have failed over 1
+                s.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
         for _ in range(_TRIES):
@@ -377,13 +377,13 @@ def _odd(message: can.Message) -> str:
 
 
 def reason_of(error: Exception) -> str:
-    """Describe a driver's exception in one line, with its type if it is not a bus error."""
+    """Describe an exception of a CAN driver in one line, with its type if it is no bus error."""
     text, kind = first_line(error), type(error).__name__
     return text if isinstance(error, can.CanError | OSError) or text == kind else f"{kind}: {text}"
 
 
 def error_code(error: Exception) -> int | None:
-    """Return the errno of a CanError or an OSError, or None if it has none."""
+    """Return the errno of an exception of a CAN driver, or None if it has none."""
     code = getattr(error, "error_code", None) or getattr(error, "errno", None)
     return code if isinstance(code, int) else None
 
@@ -403,21 +403,21 @@ _PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
 class CanLink:
-    """A `StampedLink` over python-can.
+    """`StampedLink` to a CAN bus over python-can, for any of its interfaces.
 
-    Received CAN FD frames are ignored. Of error frames, only the error state is used.
+    Received CAN FD frames are ignored. Error frames only report the state of the controller.
 
     Args:
-        bus: open bus without other readers.
+        bus: open python-can bus, from which no other code reads.
         name: name of the bus for messages.
-        drops: whether to drop a frame without waiting if the bus does not accept it.
+        drops: whether to drop a frame at once if the bus does not accept it.
 
     Attributes:
-        lost: number of frames that the bus did not accept.
-        reads: reader of the bus. It also counts the frames that its driver could not read.
+        lost: number of frames that were dropped because the bus did not accept them.
+        reads: reader of the bus, which also counts the frames that the driver could not read.
         on_error_frame: function that is called with each error frame of the driver, or None.
-        on_error_state: function that is called with the error state of the controller, if the
-            driver reports it, or None.
+        on_error_state: function that is called with each error state of the controller that the
+            driver reports, or None.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
@@ -431,12 +431,13 @@ class CanLink:
 
     @classmethod
     def open(cls, channel: str, interface: str, bit_rate: int | None = None) -> CanLink:
-        """Open a bus.
+        """Open a CAN bus with python-can, and return a link to it.
 
         Args:
-            channel: bus of the interface, such as `can0`.
+            channel: name of the bus at this interface, such as `can0`.
             interface: python-can's name for the adapter type, such as `socketcan`.
-            bit_rate: bit rate in bit/s, used if the interface sets the bit rate.
+            bit_rate: bit rate in bit/s, or None to leave it unchanged. It is used if the interface
+                can set the bit rate.
 
         Returns:
             A link that owns the bus. Close the link after use.
@@ -459,13 +460,13 @@ class CanLink:
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: Frames, /) -> None:
-        """Send frames.
+        """Send frames to the bus.
 
         Args:
             traffic: frames in the order of sending.
 
         Raises:
-            LinkClosed: the bus is gone, or accepted no frame for 1 s.
+            LinkClosed: the connection to the bus is lost, or the bus accepted no frame for 1 s.
         """
         for frame in traffic:
             deadline_us = self.now_us + _SEND_TIMEOUT_US
@@ -486,33 +487,33 @@ class CanLink:
         return True
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Wait for a first frame, then return all received frames.
+        """Wait for the next frame, then return all frames that have been received.
 
         Args:
-            timeout_us: longest wait. 0 only polls.
+            timeout_us: longest wait in microseconds. 0 does not wait.
 
         Returns:
-            The frames, empty after the timeout.
+            The frames, or an empty tuple after the timeout.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame, then return all received frames with their times.
+        """Wait for the next frame, then return all received frames with their arrival times.
+
+        The returned time was read before the last poll of the bus. If the process is stopped after
+        this poll, it can thus detect its delay, and does not count nodes as silent.
 
         Args:
-            timeout_us: longest wait. 0 only polls.
+            timeout_us: longest wait in microseconds. 0 does not wait.
 
         Returns:
-            A time, and the frames that had arrived by then, each with its own time.
+            A time, and the frames that had arrived by then, each with its arrival time.
 
         Raises:
-            LinkClosed: the bus is gone.
-
-        The returned time was read before the last poll. A process that is stopped after this poll
-        can thus detect its delay, and does not count nodes as silent.
+            LinkClosed: the connection to the bus is lost.
         """
         deadline_us = self.now_us + timeout_us
         received: list[tuple[int, CanFrame]] = []
@@ -577,7 +578,7 @@ def _error_state(message: can.Message) -> ErrorState | None:
 
 
 def bus_reason(error: BaseException) -> str:
-    """Explain in one line why a bus cannot be opened, with a remedy if known."""
+    """Return in one line why a CAN bus cannot be opened, with a remedy if one is known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
     hint = _HINTS.get(number) if isinstance(number, int) else None
     if _NO_MSGPACK in str(error):

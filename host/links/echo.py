@@ -16,10 +16,10 @@ ECHO_US: Final = 1_000_000
 
 
 class EchoFilter:
-    """A filter that separates the echo of the host's own frames from frames of other nodes.
+    """Filter that recognizes the echo of the host's own frames, on a bus that also delivers these.
 
-    If an equal frame of another node arrives before the echo, that frame counts as the echo. The
-    echo then counts as the frame of the other node.
+    If an equal frame of another node arrives before the echo, that frame counts as the echo, and
+    the echo counts as the frame of the other node.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class EchoFilter:
                 self.take(frame)
 
     def take(self, frame: CanFrame) -> bool:
-        """Return whether a frame is an expected echo. An echo is then no longer expected."""
+        """Return whether a received frame is the echo of a sent one. Each echo counts once."""
         if frame not in self._awaited:
             return False
         times = self._awaited[frame]
@@ -51,10 +51,10 @@ class EchoFilter:
 
 
 class EchoFreeLink:
-    """A `StampedLink` for python-can's udp_multicast bus that drops the echo of its own frames.
+    """`StampedLink` that removes the echo of its own frames, for python-can's udp_multicast bus.
 
     Args:
-        link: link that also receives the frames that it sends.
+        link: link whose received frames include the frames that it has sent.
     """
 
     def __init__(self, link: StampedLink) -> None:
@@ -71,9 +71,9 @@ class EchoFreeLink:
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Return frames of other nodes.
+        """Wait for frames, and return those of other nodes.
 
-        If only echoes arrive, return no frames, possibly before the timeout.
+        If only echoes arrive, the result is empty, possibly before the timeout.
         """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
@@ -91,5 +91,5 @@ class EchoFreeLink:
 
 
 def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
-    """Wrap a link to drop its echo. Return the link itself if its interface has no echo."""
+    """Return a link that drops the echo of its own frames, or the given link if it has none."""
     return EchoFreeLink(link) if interface in ECHOING else link

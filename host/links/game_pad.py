@@ -22,7 +22,7 @@ _Range = tuple[int, int]
 
 
 class StickPosition(NamedTuple):
-    """Motion requested by the sticks: forward, to the left, and turning left, each in -1..1."""
+    """Motion that the sticks of a game pad request: forward, left and left turn, each in -1..1."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -31,11 +31,11 @@ class StickPosition(NamedTuple):
 
 @dataclass(slots=True)
 class Axes:
-    """Positions of the sticks, and pressed buttons.
+    """Current positions of the sticks of a game pad, and the buttons that are pressed.
 
     Attributes:
-        ranges: lowest and highest value of each axis that the pad has.
-        held: codes of the buttons that are held.
+        ranges: lowest and highest raw value of each axis, by its code.
+        held: codes of the buttons that are pressed.
     """
 
     ranges: Mapping[int, _Range]
@@ -55,17 +55,18 @@ class Axes:
     def hand(self) -> StickPosition:
         """Return the motion that the sticks request.
 
-        The left stick gives driving forward and turning. The right stick gives driving sideways.
+        The left stick requests driving forward and turning. The right stick requests driving
+        sideways.
         """
         across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
         return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
 
 
 class EvdevPad:
-    """A reader of a pad such as `/dev/input/event5`.
+    """Reader of a game pad at a Linux input device such as `/dev/input/event5`.
 
     Raises:
-        LinkClosed: evdev is not installed, or the pad cannot be opened.
+        LinkClosed: the package evdev is not installed, or the device cannot be opened.
     """
 
     def __init__(self, path: str) -> None:

@@ -21,9 +21,9 @@ TRACEBACK: Final = "Traceback (most recent call last)"
 
 
 def first_line(error: BaseException) -> str:
-    r"""Return the first line of an error's text, without a traceback.
+    r"""Return the text of an exception in one line, without an embedded traceback.
 
-    If the error has no text, return the name of its type.
+    If it has no text, return the name of its type.
 
     >>> first_line(ValueError("bad frame\nTraceback (most recent call last):\n  File x"))
     'bad frame'
@@ -47,13 +47,13 @@ class LinkTimeout(LinkError, TimeoutError):  # noqa: N818 - a timeout, as the bu
 
 
 class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the link
-    """The line is gone: the cable is unplugged, the port is closed, or the emulator has ended."""
+    """Raised if a connection is lost: unplugged cable, closed port, or ended emulator."""
 
     __module__ = "tickrig.host"
 
 
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
-    """The device refused a request.
+    """Raised by a proxy if the device refuses a request.
 
     Args:
         message: text of the refusal for the user.
@@ -76,10 +76,11 @@ W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 
 
 class Link(Protocol[W]):
-    """The connection from a proxy to its device, with a clock.
+    """Connection between a proxy and its device, which may be real or emulated, with a clock.
 
-    A proxy reads the time from its link, never from the clock of the machine. On a rig in virtual
-    time, the same proxy waits a minute of virtual time within a millisecond.
+    A proxy is the host's object for a device. It reads the time from its link, never from the clock
+    of the machine. On a rig in virtual time, the same proxy waits a minute of virtual time within a
+    millisecond.
     """
 
     @property
@@ -95,10 +96,10 @@ class Link(Protocol[W]):
         """
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return received traffic, which is empty after the timeout `timeout_us`.
+        """Wait for traffic up to `timeout_us` microseconds. The result is empty after the timeout.
 
         Raises:
-            LinkClosed: the line is gone.
+            LinkClosed: the connection is lost.
         """
         ...
 
@@ -111,16 +112,16 @@ StampedFrames = tuple[tuple[int, CanFrame], ...]
 
 
 class StampedLink(Link[Frames], Protocol):
-    """A link to a CAN bus with time stamps.
+    """Link to a CAN bus that returns each received frame with its arrival time.
 
-    The time stamps show whether the bus was silent or the host read its frames late.
+    The arrival times show whether the bus was silent, or the host read the frames late.
     """
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame. Return a time, and all frames received by then.
+        """Wait for the next frame. Return the time, and all frames that have arrived by then.
 
         Raises:
-            LinkClosed: the bus is gone.
+            LinkClosed: the connection to the bus is lost.
         """
         ...
 
@@ -153,16 +154,18 @@ class Closing(ABC):
 
 
 class ReopeningLink(Generic[W]):
-    """A `Link` that opens a new link after its line was lost.
+    """Link that reconnects by itself after its connection was lost.
 
-    A lost line raises LinkClosed once, as in every link. Each later `send` tries to reopen the
-    line, for example after the cable is plugged in again or the emulator is restarted.
+    A lost connection raises LinkClosed once, as in every link. After that, each `send` first tries
+    to connect again, for example to a cable that was plugged in again or an emulator that was
+    restarted.
 
     Args:
-        open_link: function that opens the line, which is called at once.
+        open_link: function that opens the connection. It is called at once, and for each new
+            attempt.
 
     Raises:
-        LinkClosed: the line cannot be opened.
+        LinkClosed: the first connection cannot be opened.
     """
 
     def __init__(self, open_link: Callable[[], Link[W]]) -> None:
@@ -171,13 +174,14 @@ class ReopeningLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """Time on the clock of the link. The clock continues while the line is lost."""
+        """Time on the clock of the link in microseconds, also while the connection is lost."""
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
-        """Send traffic. If the line was lost, open a new link first.
+        """Send traffic. If the connection was lost, connect again first.
 
-        The method raises LinkClosed if the new link cannot be opened.
+        Raises:
+            LinkClosed: the connection is lost now, or cannot be opened again.
         """
         # Only sending opens again: a reader in a loop would try as often as it looks.
         if self._gone and not self._closed:
@@ -189,9 +193,10 @@ class ReopeningLink(Generic[W]):
             raise
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return received traffic, which is empty after the timeout `timeout_us`.
+        """Wait for traffic up to `timeout_us` microseconds. The result is empty after the timeout.
 
-        Raise LinkClosed if the line is lost.
+        Raises:
+            LinkClosed: the connection is lost.
         """
         try:
             return self._link.receive(timeout_us)

@@ -51,12 +51,12 @@ _Written = TypeVar("_Written", bound="int | _HasDescriptor")
 def ready(
     readers: Iterable[_Read], writers: Iterable[_Written] = (), wait_s: float | None = None
 ) -> tuple[list[_Read], list[_Written]]:
-    """Wait until at least one descriptor can be read or written.
+    """Wait until at least one file descriptor can be read or written, as `select` does.
 
     Args:
-        readers: descriptors, or objects with a descriptor.
-        writers: descriptors, or objects with a descriptor.
-        wait_s: longest wait in s, or None without limit.
+        readers: descriptors to read from, or objects with a descriptor.
+        writers: descriptors to write to, or objects with a descriptor.
+        wait_s: longest wait in seconds, or None to wait without limit.
 
     Returns:
         The descriptors that can be read, and the descriptors that can be written. Both lists
@@ -134,12 +134,11 @@ _T = TypeVar("_T")
 
 
 class WaitingQueue(Generic[_T]):
-    """A queue for one reading thread and any writing threads.
+    """Queue from which one thread reads and to which any threads write, safe against signals.
 
-    The queues of Python are not suitable. `queue.SimpleQueue` waits without end (CPython 3.11) if
-    its timeout has passed before it checks again. This happens after a signal, or if its lock
-    happens to be free. Ctrl-C in the middle of a call of `queue.Queue` or `threading.Event` can
-    leave the lock of the object taken.
+    The queues of Python are not suitable. `queue.SimpleQueue` (CPython 3.11) may wait without end,
+    although it has a timeout: after a signal, or if its lock happens to be free. In `queue.Queue`
+    and `threading.Event`, a Ctrl-C in the middle of a call can leave a lock acquired.
     """
 
     def __init__(self) -> None:
@@ -154,13 +153,13 @@ class WaitingQueue(Generic[_T]):
             self._nothing_new.release()
 
     def get(self, wait_s: float | None = None) -> _T:
-        """Return the first item.
+        """Remove the first item from the queue and return it. Wait for an item if there is none.
 
         Args:
-            wait_s: longest wait, or None without limit.
+            wait_s: longest wait in seconds, or None to wait without limit.
 
         Raises:
-            Empty: nothing arrived in time.
+            Empty: no item arrived in time.
         """
         deadline_s = None if wait_s is None else monotonic() + wait_s
         while True:

@@ -62,29 +62,29 @@ class RecordingLink(Generic[W]):
         return self._file.error
 
     def send(self, traffic: W, /) -> None:
-        """Send and record traffic.
+        """Send traffic over the link, and record it in the trace.
 
         Args:
-            traffic: bytes or frames.
+            traffic: bytes or CAN frames.
 
         Raises:
-            LinkClosed: the line is gone. Unsent data are not recorded.
+            LinkClosed: the connection is lost. What was not sent is not recorded.
         """
         at_us = self._link.now_us
         self._link.send(traffic)
         self._record(Mark.TO_DEVICE, [(at_us, item) for item in _items(traffic)])
 
     def receive(self, timeout_us: int, /) -> W:
-        """Receive and record traffic.
+        """Receive traffic from the link, and record it in the trace.
 
         Args:
-            timeout_us: longest wait. 0 only polls.
+            timeout_us: longest wait in microseconds. 0 does not wait.
 
         Returns:
             The received traffic, empty after the timeout.
 
         Raises:
-            LinkClosed: the line is gone.
+            LinkClosed: the connection is lost.
         """
         traffic = self._link.receive(timeout_us)
         at_us = self._link.now_us
@@ -92,17 +92,17 @@ class RecordingLink(Generic[W]):
         return traffic
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Receive frames with their times, and record them.
+        """Receive CAN frames with their arrival times, and record them in the trace.
 
         Args:
-            timeout_us: longest wait. 0 only polls.
+            timeout_us: longest wait in microseconds. 0 does not wait.
 
         Returns:
-            A time, and the frames received by then, each with its own time.
+            A time, and the frames that had arrived by then, each with its arrival time.
 
         Raises:
-            LinkClosed: the bus is gone.
-            TypeError: the link is not a link to a bus.
+            LinkClosed: the connection to the bus is lost.
+            TypeError: the link carries bytes, not CAN frames.
         """
         link: Any = self._link
         if not hasattr(link, "receive_stamped"):
@@ -113,10 +113,10 @@ class RecordingLink(Generic[W]):
         return now_us, stamped
 
     def note(self, name: str, value: Setting) -> None:
-        """Record a manual action on the device.
+        """Record that a user operated the device by hand, for example pressed a button.
 
         Args:
-            name: name of the physical input, such as `power_button`.
+            name: name of the operated input, such as `power_button`.
             value: new value of the input.
         """
         self._write(self._link.now_us, Mark.PHYSICAL, text=change_text(name, value))
@@ -126,7 +126,10 @@ class RecordingLink(Generic[W]):
         self._write(self._link.now_us, Mark.PHYSICAL, text=RESET)
 
     def close(self) -> None:
-        """Write the duration of the recording, and close the link. You may call this again."""
+        """Complete the trace with the duration of the recording, and close the link.
+
+        A second call does nothing.
+        """
         with self._lock:
             end_us = max(self._link.now_us - self._start_us, self._latest_us)
             self._file.close(BenchRecord(end_us, "", Mark.END).encode())

@@ -27,7 +27,7 @@ _UNANSWERED_MS: Final = 25_000
 
 
 def tune(connection: socket.socket) -> None:
-    """Send each write at once, and detect a vanished machine after 25 s.
+    """Set up a TCP connection to send data at once, and to detect after 25 s that its peer is gone.
 
     Args:
         connection: TCP connection to tune.
@@ -80,7 +80,7 @@ class _Rfc2217Serial(rfc2217.Serial):
     _agreed: object = None
 
     def open(self) -> None:
-        """Open the port.
+        """Open the remote serial port with RFC 2217.
 
         Raises:
             SerialException: no server answers, or the server does not support RFC 2217. The message
@@ -106,10 +106,10 @@ class _Rfc2217Serial(rfc2217.Serial):
             connection.close()
 
     def read(self, size: int = 1) -> bytes:
-        """Return up to `size` bytes, or fewer after the time-out, or if the connection has ended.
+        """Read up to `size` bytes, or fewer after the time-out or at the end of the connection.
 
         Raises:
-            SerialException: the connection has ended, and all received data were read.
+            SerialException: the connection has ended, and all received data have been read.
         """
         if not self.is_open or (queue := self._queue) is None:
             raise PortNotOpenError
@@ -155,14 +155,14 @@ _READ_BYTES: Final = 4_096
 
 
 class SerialLink:
-    """A `Link[bytes]` over pyserial.
+    """Link that carries bytes over a serial port, opened with pyserial.
 
     Args:
         url: device path or pyserial URL, such as `/dev/ttyACM0`, `COM3`, `socket://host:port`,
             `rfc2217://host:port` or `loop://`.
         baud: bit rate in bit/s, with 8N1.
         exclusive: whether to lock the port by flock, as pyserial's own tools do. Without the lock,
-            two readers would each get a part of the data.
+            two programs could read the port, and each would get a part of the data.
 
     Raises:
         LinkClosed: the port cannot be opened, or another program uses it.
@@ -188,7 +188,7 @@ class SerialLink:
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: bytes, /) -> None:
-        """Write bytes.
+        """Write bytes to the serial port.
 
         Args:
             traffic: bytes to send.
@@ -202,10 +202,10 @@ class SerialLink:
             raise LinkClosed(f"cannot write to {self._url!r}: {error}") from error
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Wait for a first byte, then return all received bytes.
+        """Wait for the next byte, then return all bytes that have been received.
 
         Args:
-            timeout_us: longest wait. 0 only polls.
+            timeout_us: longest wait in microseconds. 0 does not wait.
 
         Returns:
             The bytes, empty after the timeout.
@@ -250,11 +250,11 @@ _COMMAND_SHOWN: Final = 100
 
 
 def explain_open_error(url: str, error: Exception) -> str:
-    """Return the reason why a port cannot be opened.
+    """Return a text that explains why a serial port cannot be opened.
 
     Args:
-        url: requested port.
-        error: exception on opening.
+        url: device path or pyserial URL of the port.
+        error: exception that was raised when the port was opened.
     """
     around = error.__context__ if error.__cause__ is None else None
     if isinstance(around, OSError) and around.strerror:

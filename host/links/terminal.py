@@ -17,15 +17,16 @@ _CONTROL_CHARACTERS: Final = 6
 
 
 def take_keys(descriptor: int) -> Callable[[], None]:
-    """Make a terminal return each key at once, without echo. Reading no longer blocks.
+    """Switch a terminal to a mode in which each key can be read at once, without echo.
 
-    Ctrl-Z is disabled, because a program stopped by it would leave the terminal in this mode.
+    Reading the terminal then does not block. Ctrl-Z is disabled, because a program stopped by it
+    would leave the terminal in this mode.
 
     Args:
-        descriptor: descriptor of the terminal.
+        descriptor: file descriptor of the terminal.
 
     Returns:
-        A function that restores the terminal. It does nothing if the terminal is gone.
+        A function that restores the former mode. It does nothing if the terminal is gone.
 
     Raises:
         OSError: the descriptor is not a terminal, or the system has no POSIX terminals (Windows).
@@ -60,17 +61,16 @@ _LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
-    """A writer that runs in its own thread, so that a stuck terminal does not block the program.
+    """Writer that outputs text from its own thread, so that a stuck terminal blocks nothing else.
 
-    A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
-    fit into the queue is dropped.
+    A terminal is stuck while it is stopped, or while its connection hangs. Text that does not fit
+    into the queue is then dropped.
 
     Args:
-        descriptor: descriptor of the terminal. The text is written to a duplicate of the
-            descriptor.
-        caught_up: function that is called from that thread when all text is written and some text
-            was dropped before.
-        lost: function that is called from that thread when the terminal is gone.
+        descriptor: file descriptor of the terminal. The writer uses a duplicate of it.
+        caught_up: function that the thread calls when all queued text is written after some text
+            was dropped.
+        lost: function that the thread calls when the terminal is gone.
 
     Attributes:
         gone: whether the terminal is gone.

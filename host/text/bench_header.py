@@ -26,7 +26,7 @@ class WireType(StrEnum):
 
 
 class Place(StrEnum):
-    """The place where a trace was recorded: at the devices, tick by tick, or at the host's port."""
+    """Where a trace was recorded: at the devices in each tick, or at the port of the host."""
 
     DEVICE = "device"
     PORT = "port"
@@ -34,10 +34,10 @@ class Place(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class WireEntry:
-    """A wire of a bench.
+    """Description of one wire (a bus or serial line) in the header of a trace.
 
     Attributes:
-        type: kind of traffic on the wire.
+        type: type of the wire, which defines its traffic: CAN frames or bytes.
         config: settings of the wire, such as the bit rate.
     """
 
@@ -47,17 +47,17 @@ class WireEntry:
 
 @dataclass(frozen=True, slots=True)
 class DeviceEntry:
-    """Data for rebuilding a device of a bench in a replay.
+    """Description of one device in the header of a trace, from which a replay rebuilds the device.
 
     Attributes:
-        wire: name of the wire of the device.
-        type: device type, model, EDS or DCF file, or `FILE.py:Class`. The text is empty if a
-            program made the device, which then cannot be rebuilt.
+        wire: name of the wire to which the device is connected.
+        type: device type, model, EDS or DCF file, or `FILE.py:Class`. It is empty if a program made
+            the device, which a replay cannot rebuild.
         config: settings of the device.
-        node_id: node-ID of a CANopen node.
+        node_id: node-ID of a CANopen node, or None for another device.
         sha256: SHA-256 of the file in `type`.
-        files: SHA-256 of the files that the file in `type` references, by name.
-        stored: content of the non-volatile memory.
+        files: SHA-256 of each file that the file in `type` references, by name.
+        stored: content of the device's non-volatile memory at the start.
     """
 
     wire: str
@@ -71,16 +71,16 @@ class DeviceEntry:
 
 @dataclass(frozen=True, slots=True)
 class BenchHeader:
-    """The first line of a trace, with the devices of the bench.
+    """First line of a trace: the devices and wires of the recorded bench, for a replay.
 
     Attributes:
         devices: devices by name.
         wires: wires by name.
-        seed: seed of all random numbers.
-        place: place of the recording.
+        seed: seed of all random numbers in the run.
+        place: whether the trace was recorded at the devices or at the host's port.
 
     Raises:
-        ValueError: a name is invalid, or a wire is unknown.
+        ValueError: a name is invalid, or a device refers to an unknown wire.
     """
 
     devices: Mapping[str, DeviceEntry]
@@ -172,9 +172,10 @@ class _Reader:
         self.values, self._owner = values, owner
 
     def take(self, name: str, expected: type, *default: Any) -> Any:
-        """Return a value of the expected type, or the default.
+        """Return a value of the header after checking its type, or the default if it is missing.
 
-        Raise ValueError if the value has another type, or if it is missing and there is no default.
+        Raises:
+            ValueError: the value has another type, or is missing and has no default.
         """
         value = self.values.get(name, *default)
         if type(value) is not expected and not (default and value == default[0]):

@@ -52,13 +52,13 @@ BUS_STATE: Final = {
 
 
 class BenchRecord(NamedTuple):
-    """One line of a trace.
+    """One line of a trace of version 2: traffic, a change of an input, or the end of the recording.
 
     Attributes:
-        at_us: time of the tick, or time at the host's port.
-        name: name of the device, or for `~` the name of the wire.
-        mark: mark that shows the kind of the line.
-        traffic: bytes or frame of a `>` or `<` line.
+        at_us: time of the tick, or time at the host's port, in microseconds.
+        name: name of the device. In a `~` line, it is the name of the wire.
+        mark: character that defines the type of the line.
+        traffic: bytes or CAN frame of a `>` or `<` line.
         text: text of a `!` or `~` line.
         line: number of the line in its file, from 1.
     """
@@ -84,9 +84,9 @@ class BenchRecord(NamedTuple):
 
     @property
     def change(self) -> tuple[str, Setting] | None:
-        """Name and value of the changed input in a `!` line.
+        """Name and new value of the input that a `!` line has changed.
 
-        The result is None if the line is a reset or a report of a CAN controller.
+        The result is None if the line records a reset or the state of a CAN controller.
         """
         name, equals, value = self.text.partition("=")
         return (name, json.loads(value)) if equals else None
@@ -102,10 +102,10 @@ def change_text(name: str, value: Setting) -> str:
 
 
 class BenchParser:
-    """A parser for the lines of a trace after its header.
+    """Parser for the lines of a trace of version 2 after its header.
 
     Args:
-        header: header with the names and wires.
+        header: header of the trace, whose device and wire names the lines use.
     """
 
     def __init__(self, header: BenchHeader) -> None:
@@ -114,10 +114,10 @@ class BenchParser:
         self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
-        """Parse the lines one by one. Times must not decrease, and no line may follow the end mark.
+        """Parse the lines of the trace, and yield a record for each. Times must not decrease.
 
         Raises:
-            TraceError: a line is damaged.
+            TraceError: a line is damaged, an earlier time follows, or a line follows the end mark.
         """
         made, known, before_us, ended = tuple.__new__, self._known, 0, False
         for number, line in enumerate(lines, 2):

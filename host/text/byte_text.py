@@ -21,9 +21,9 @@ _TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
-    """Return bytes as printable ASCII.
+    """Return bytes as printable ASCII text, with escapes for all other bytes.
 
-    Blanks at both ends are also escaped, to make them visible.
+    A blank at the beginning or end is also escaped, so that it is visible.
     """
     text = "".join(map(_TEXT.__getitem__, data))
     if text.endswith(" "):
@@ -32,10 +32,10 @@ def escape(data: bytes) -> str:
 
 
 def unescape(text: str) -> bytes:
-    r"""Return the bytes of a text that `escape` made.
+    r"""Return the bytes that a text of `escape` stands for.
 
     Raises:
-        ValueError: the text has a character or an escape that `escape` never writes.
+        ValueError: the text contains a character or an escape that `escape` never writes.
     """
     out, at = [], 0
     while at < len(text):

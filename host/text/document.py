@@ -15,7 +15,10 @@ Scalar = Key
 
 
 class FilePlace(NamedTuple):
-    """A file name and a line number. Line 0 stands for the whole file. The name may be empty."""
+    """Position in a text file: file name and line, for error messages.
+
+    Line 0 stands for the whole file. The name may be empty.
+    """
 
     file: str
     line: int
@@ -26,7 +29,7 @@ class FilePlace(NamedTuple):
 
 
 class FileMistake(NamedTuple):
-    """One error in one of several files.
+    """One error in a file of the user, with its position.
 
     Attributes:
         place: file and line of the error.
@@ -45,13 +48,13 @@ class FileMistake(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A value of the file.
+    """A value of a file that the user wrote, with its position for error messages.
 
     Attributes:
-        value: value of a scalar, items of a list, or items of a mapping by key.
+        value: value of a scalar, tuple of the items of a list, or items of a mapping by key.
         place: file and line of the item.
-        text: text of a scalar in the file, shortened to one line.
-        keys: places of the keys of a mapping.
+        text: text of a scalar as in the file, shortened to one line.
+        keys: file and line of each key of a mapping.
     """
 
     value: Scalar | tuple[Item, ...] | dict[Key, Item]

@@ -21,12 +21,12 @@ _STYLE: Final = "page.css"
 
 
 class PageTemplate:
-    """An HTML page's template, stored in the folder `template` of a package.
+    """Jinja2 template for a self-contained HTML page, from the folder `template` of a package.
 
     Args:
         package: name of the package.
-        names: filters and globals of the template, besides the common ones.
-        script: file name of the page's script, empty if the page has no script.
+        names: filters and globals that the template uses, in addition to the common ones.
+        script: file name of the JavaScript of the page, empty if it has none.
         page: file name of the template.
     """
 
@@ -56,7 +56,7 @@ class PageTemplate:
         self._template = environment.get_template(page)
 
     def render(self, **values: Any) -> str:
-        """Return the page with these values filled in. Equal values always give the same page."""
+        """Return the HTML page with the given values. Equal values always give the same page."""
         policy = page_text.content_policy(self._style, self._script)
         return self._template.render(
             style=Markup(self._style), script=Markup(self._script), policy=policy, **values

@@ -27,16 +27,16 @@ OUTPUT: Final = "system-out"
 
 @dataclass(frozen=True, slots=True)
 class JunitCase:
-    """A test case.
+    """One test case of a JUnit report.
 
     Attributes:
-        group: group of the case, which is its `classname`.
+        group: name of the case's group, its `classname` in JUnit.
         name: name of the case.
-        tag: tag of the case: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`, or empty if the case
-            passed.
-        message: reason in one line, empty for an `OUTPUT`.
-        text: details of the case.
-        duration_us: duration of the case, or None if unknown.
+        tag: outcome of the case: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`, or empty if it passed
+            without output.
+        message: reason for the outcome in one line, empty for `OUTPUT`.
+        text: details of the outcome.
+        duration_us: duration of the case in microseconds, or None if it is unknown.
     """
 
     group: str
@@ -49,12 +49,12 @@ class JunitCase:
 
 @dataclass(frozen=True, slots=True)
 class JunitSuite:
-    """A suite of test cases.
+    """One suite of test cases in a JUnit report.
 
     Attributes:
         name: name of the suite.
         cases: cases in the order of the report.
-        properties: properties of the tested object, and settings, by name.
+        properties: texts about the tested object and the settings, by name.
     """
 
     name: str
@@ -63,11 +63,11 @@ class JunitSuite:
 
 
 def junit_text(suites: Iterable[JunitSuite], name: str = "") -> str:
-    """Return the report as JUnit XML.
+    """Return test suites as a JUnit report in XML.
 
     Args:
-        suites: suites in their order.
-        name: name of the whole report, empty for none.
+        suites: suites in the order of the report.
+        name: name of the whole report, or empty for none.
     """
     root = Element("testsuites", {"name": harmless(name)} if name else {})
     for suite in suites:

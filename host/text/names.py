@@ -14,7 +14,9 @@ _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
 def known(names: Iterable[str]) -> str:
-    """Return the names as one text. A long list is cut, and the number of names is added.
+    """Return names as one text for an error message, separated by commas.
+
+    A long list is cut, and the total number of names is added.
 
     >>> known(["stick", "lamp"])
     'stick, lamp'
@@ -41,9 +43,10 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the most similar name, ignoring case, or an empty list if no name is similar.
+    """Return the known name that is most similar to a misspelled one.
 
-    A name that differs only in its numbers is another name, not a misspelling.
+    The result is an empty list if no name is similar. Case is ignored. A name that differs only in
+    its numbers is another name, not a misspelling.
 
     >>> closest("EPOS", ["epos", "rrc"]), closest("stik", ["left/stick", "right/stick"])
     (['epos'], ['left/stick'])

@@ -20,7 +20,7 @@ _LISTING: Final = ' style="max-height:30em;overflow:auto;font-family:monospace;l
 
 
 def text(value: object) -> str:
-    """Return a value as text with escaped HTML characters.
+    """Return a value as text for HTML, with special characters escaped.
 
     A long text is cut, and the number of omitted characters is added.
     """
@@ -48,14 +48,14 @@ def table(
     opened: bool = False,
     most: int = 200,
 ) -> str:
-    """Return an HTML table, or an empty text if there are no rows.
+    """Return rows as an HTML table for a notebook, or an empty text if there are no rows.
 
     Args:
         columns: titles of the columns.
         rows: cells of the rows.
-        title: title of a table that can be folded.
-        opened: whether a table that can be folded is unfolded at first.
-        most: number of rows that are shown. A line below gives the number of the other rows.
+        title: title of the table. A table with a title can be folded.
+        opened: whether a foldable table is unfolded at first.
+        most: maximum number of shown rows. A line below the table gives the number of the others.
     """
     every = iter(rows)
     shown = list(islice(every, most))
@@ -77,9 +77,9 @@ def table(
 
 
 def listing(lines: Sequence[str], most: int = 1_000) -> str:
-    """Return the last lines of a text in a box that scrolls.
+    """Return the last lines of a text as a scrollable HTML box for a notebook.
 
-    A line above the box gives the number of omitted lines.
+    If lines are omitted, their number is shown above.
     """
     left_out = len(lines) - most
     above = f"… {left_out} earlier lines\n" if left_out > 0 else ""

@@ -55,12 +55,12 @@ def in_cells(text: str) -> str:
 
 
 def json_text(value: object, *, compact: bool = False, letters: bool = False) -> str:
-    r"""Return a value as JSON in one line, with escaped control characters.
+    r"""Return a value as one line of JSON that contains no control characters.
 
     Args:
         value: value for `json.dumps`.
-        compact: whether to omit blanks.
-        letters: whether to write letters beyond ASCII unescaped.
+        compact: whether to omit the blanks after commas and colons.
+        letters: whether to write letters outside ASCII as they are, not as escapes.
 
     >>> json_text("µ\x1b\x7f\x9b\u202e", letters=True), json_text("µ\x7f")
     ('"µ\\u001b\\u007f\\u009b\\u202e"', '"\\u00b5\\u007f"')
@@ -71,9 +71,9 @@ def json_text(value: object, *, compact: bool = False, letters: bool = False) ->
 
 
 def content_policy(style: str, script: str = "") -> str:
-    """Return the content security policy of a page.
+    """Return the content security policy of an HTML page, for its `meta` tag.
 
-    The policy allows no network, and only the style and script of the page itself.
+    It forbids the network, and allows only the style and the script of the page itself.
     """
     from base64 import b64encode  # noqa: PLC0415 - each command imports this module
     from hashlib import sha256  # noqa: PLC0415 - it takes 3 ms

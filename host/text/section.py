@@ -78,7 +78,12 @@ def anything(value: Any) -> Any:
 
 
 def matching(accepts: Callable[[str], object], what: str) -> _Taker:
-    """Return a function that accepts a text if `accepts` does. `what` describes the valid texts."""
+    """Return a converter for a TOML field that accepts only texts for which `accepts` is true.
+
+    Args:
+        accepts: function that returns whether a text is valid.
+        what: description of the valid texts, for the message about another value.
+    """
 
     def take(value: object) -> str:
         if isinstance(value, str) and accepts(value):
@@ -107,7 +112,10 @@ def texts(value: object) -> tuple[str, ...]:
 
 
 def command(value: object) -> tuple[str, ...]:
-    """Accept a command line, as words or as one text, which is split as in a shell."""
+    """Convert the value of a TOML field to the words of a command line.
+
+    The value is a list of words, or one text that is split as in a shell.
+    """
     if isinstance(value, list):
         return texts(value)
     try:
@@ -200,12 +208,12 @@ _MOST: Final = 500
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """The definition of a key in a TOML table.
+    """Definition of a key in a TOML file of the user: how its value is converted and described.
 
     Attributes:
-        field: function that converts the value of the field.
-        values: allowed values as text for the user.
-        text: description as text for the user.
+        field: function that checks and converts the value.
+        values: description of the allowed values, for the user.
+        text: description of the key, for the user.
         default: default value as text for the user, empty if the key is required.
     """
 
@@ -229,12 +237,12 @@ def rows(schema: Schema) -> Iterator[str]:
 
 @dataclass(slots=True)
 class Notes:
-    """The errors found in a TOML document.
+    """Collector of the errors in a TOML file of the user.
 
     Attributes:
-        document: document with the errors.
+        document: parsed file, which gives the line of each value.
         mistakes: errors found until now.
-        names: names of values in the file if they differ from the TOML keys, empty for a rig file.
+        names: names to use in messages for values at certain keys. It is empty for a rig file.
     """
 
     document: TomlDocument
@@ -247,7 +255,7 @@ class Notes:
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return the start of an error message: the keys as written in the file, and a colon."""
+        """Return the beginning of an error message: the keys as in the file, and a colon."""
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
@@ -259,12 +267,12 @@ class Notes:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A table of a TOML document.
+    """A table of a TOML file of the user, whose methods convert values and report errors.
 
     Attributes:
-        notes: errors of the whole document.
-        keys: keys that lead to the table, from the top.
-        values: values in the table.
+        notes: collector of the errors in the whole file.
+        keys: keys from the top of the file to the table.
+        values: values of the table by key.
     """
 
     notes: Notes
@@ -272,7 +280,12 @@ class Section:
     values: dict[str, Any]
 
     def wrong(self, reason: str, *keys: str | int) -> None:
-        """Add an error for the table, or for the value at keys in the table."""
+        """Report an error in this table, or in the value at the given keys below it.
+
+        Args:
+            reason: text of the error for the user.
+            keys: keys from this table to the value.
+        """
         self.notes.wrong((*self.keys, *keys), reason)
 
     def unknown(self, reason: str, *keys: str | int) -> None:
@@ -281,11 +294,11 @@ class Section:
             self.wrong(reason, *keys)
 
     def read(self, schema: Schema, *others: str) -> dict[str, Any]:
-        """Return the values of the table, converted by a schema. Report and omit invalid values.
+        """Convert the values of the table and return them by key. Report and omit invalid ones.
 
         Args:
-            schema: fields by key.
-            others: keys that are read elsewhere.
+            schema: definition of each key.
+            others: keys that other code reads, which are not reported as unknown.
         """
         found: dict[str, Any] = {}
         for key, value in self.values.items():
@@ -313,7 +326,7 @@ class Section:
     def sub(self, key: str) -> Section | None:
         """Return the table of a key, or None if the key is missing.
 
-        If the value is not a table, report the error and return None.
+        If the value is not a table, it is reported as an error, and the result is also None.
         """
         value = self.values.get(key)
         if value is None or value is BROKEN:
@@ -350,7 +363,7 @@ class Section:
 
 
 def read_section(text: str) -> Section:
-    """Parse a TOML text and return its top table. Errors of the text are in `notes`."""
+    """Parse a TOML text and return its top table. Syntax errors are collected in its `notes`."""
     document = read_toml(text)
     return Section(Notes(document), (), document.values)
 
@@ -367,7 +380,7 @@ def in_a_line(mistakes: Sequence[Mistake]) -> str:
 
 
 def is_broken(value: object) -> bool:
-    """Return whether a value has invalid TOML in it, which is already reported as an error."""
+    """Return whether a value contains invalid TOML, so that an error about it already exists."""
     match value:
         case dict():
             return any(map(is_broken, value.values()))

@@ -27,12 +27,15 @@ _COMMENT: Final = re.compile(r"(^|\s)#.*")
 
 
 class StepError(ValueError):
-    """Steps in a file are invalid. The message is `FILE:LINE: the value, and what is allowed`."""
+    """Raised if the steps in a file of the user are invalid.
+
+    The message has the form `FILE:LINE: the value, and what is allowed`.
+    """
 
 
 @dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
 class Condition(Generic[_Came]):
-    """An expected event: its text in the file, and a function that recognizes the event."""
+    """An event that a step waits for: its text in the file, and a function that recognizes it."""
 
     text: str
     matches: Callable[[_Came], bool]

@@ -33,11 +33,11 @@ BROKEN: Final = _Broken.BROKEN
 
 
 class Mistake(NamedTuple):
-    """One error in a TOML text.
+    """One syntax error in a TOML text.
 
     Attributes:
         line: number of the line, from 1.
-        reason: reason as text for the user.
+        reason: text of the error for the user.
     """
 
     line: int
@@ -49,13 +49,13 @@ TomlPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class TomlDocument:
-    """The result of reading a TOML text.
+    """Parsed TOML text with the line of each value, and with all its syntax errors.
 
     Attributes:
-        values: values of the text, with `BROKEN` in place of invalid values.
-        lines: line of each value, or of the header of a table, by path.
-        mistakes: errors in the order of their lines.
-        whole: whether all headers were read. If not, tables may be missing.
+        values: values by key. `BROKEN` replaces each invalid value.
+        lines: line of each value or table header, by its path of keys and indices.
+        mistakes: syntax errors in the order of their lines.
+        whole: whether all table headers could be read. If not, tables may be missing.
     """
 
     values: dict[str, Any]
@@ -64,10 +64,10 @@ class TomlDocument:
     whole: bool = True
 
     def line_of(self, path: Sequence[str | int]) -> int:
-        """Return the line of a value, or of the nearest enclosing value.
+        """Return the line of a value, or of the value that contains it if its line is unknown.
 
         Args:
-            path: keys and indices from the top.
+            path: keys and indices from the top to the value.
         """
         for end in range(len(path), 0, -1):
             if line := self.lines.get(tuple(path[:end])):
@@ -106,10 +106,10 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table of a key in the path of a header, or the last table of an array.
+        """Return the table for one key of a header's path. For an array, return its last table.
 
         Raises:
-            _TakenError: the key has another value.
+            _TakenError: the key has a value that is not a table.
         """
         node = self.entries.setdefault(key, _Table(line))
         if isinstance(node, _Array) and not node.frozen:
@@ -119,13 +119,21 @@ class _Table:
         return node
 
     def open(self, line: int, key: str) -> _Table:
-        """Open the table of a header `[key]`. Raise _TakenError if the key is already in use."""
+        """Start the table of a header `[key]`.
+
+        Raises:
+            _TakenError: the key already has a value or a header.
+        """
         node = self.dotted(line, key)
         node.line, node.closed = line, True
         return node
 
     def add(self, line: int, key: str) -> _Table:
-        """Append a table for a header `[[key]]`. Raise _TakenError if the key has another value."""
+        """Append a new table to an array, for a header `[[key]]`.
+
+        Raises:
+            _TakenError: the key has a value that is not such an array.
+        """
         node = self.entries.setdefault(key, _Array(line, frozen=False))
         if not isinstance(node, _Array) or node.frozen:
             raise _TakenError(key, node.line)
@@ -133,9 +141,10 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table of the first part of a dotted key.
+        """Return the table for the first part of a dotted key such as `a.b = 1`.
 
-        Raise _TakenError if the key has another value.
+        Raises:
+            _TakenError: the key has a value that is not a table, or a table with a header.
         """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:
@@ -202,10 +211,10 @@ _STATEMENT: Final = re.compile(
 
 
 def load_toml(text: str) -> dict[str, Any]:
-    """Parse a TOML text with the parser of the standard library.
+    """Parse a TOML text with the standard library, which stops at the first error.
 
     Args:
-        text: whole text.
+        text: the whole text.
 
     Raises:
         TOMLDecodeError: the text is invalid TOML, or is nested too deeply.

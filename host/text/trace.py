@@ -56,7 +56,7 @@ class Mark(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The first line of a trace: the data for rebuilding the device in a replay."""
+    """First line of a trace: type and settings of the recorded device, for a replay."""
 
     device: str
     config: Config = field(default_factory=dict)
@@ -68,11 +68,11 @@ class Header:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One line of a trace.
+    """One line of a trace: received or sent bytes, a change of an input, or the end.
 
     Attributes:
-        at_us: time of the tick.
-        mark: kind of the line.
+        at_us: time of the tick in microseconds.
+        mark: character that defines the type of the line.
         data: bytes of a `>` or `<` line.
         text: text of a `!` line, which is `NAME=VALUE` or `reset`.
         line: number of the line in its file, from 1.
@@ -97,9 +97,10 @@ class Record:
 
 
 def trace_text(data: bytes) -> str:
-    """Decode the bytes of a trace.
+    """Decode the bytes of a trace file to text.
 
-    Raise TraceError if the text is empty or its first line is incomplete.
+    Raises:
+        TraceError: the file is empty, is not ASCII, or its first line is incomplete.
     """
     try:
         text = data.decode("ascii")
@@ -148,9 +149,11 @@ def parse_record(line: str, number: int) -> Record:
 
 
 def parse_records(lines: Iterable[str]) -> Iterator[Record]:
-    """Parse the lines after the header.
+    """Parse the lines of a trace after its header, and yield a record for each.
 
-    Times must not decrease, and no line may follow the end mark.
+    Raises:
+        TraceError: a line is damaged, its time is before that of the line above, or it follows the
+            end mark.
     """
     before = Record(0, Mark.PHYSICAL)
     for number, line in enumerate(lines, 2):

@@ -11,14 +11,15 @@ SUFFIX: Final = ".py"
 
 
 def find_class(spec: str, base: type[Any]) -> type[Any]:
-    """Run a user's file and return a class in the file.
+    """Run a Python file of the user, and return one of its classes.
 
     Args:
-        spec: text `FILE.py:Class`.
+        spec: file and class in the form `FILE.py:Class`.
         base: base class that the class must have.
 
     Raises:
-        ValueError: the notation is wrong, the file or class is unknown, or the file cannot be run.
+        ValueError: the text has another form, the file cannot be found or run, or it has no such
+            class.
     """
     file, colon, name = spec.rpartition(":")
     if not colon or not file.endswith(SUFFIX):
@@ -33,7 +34,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
 
 
 def explain_error(error: BaseException, file: str = "") -> str:
-    """Describe an error in a user's file in one line, with file and line number if known."""
+    """Describe an error in a Python file of the user in one line, with file and line if known."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"
     import traceback  # noqa: PLC0415 - slow

@@ -30,7 +30,7 @@ def parse_time_us(text: str) -> int:
 
 
 def parse_time_with_unit_us(text: str) -> int:
-    """Read a time in microseconds. The unit is required, except for 0.
+    """Parse a time such as `1.5s` or `20ms`. Return it in microseconds. Only 0 needs no unit.
 
     Raises:
         ValueError: the text is not a time, or has no unit.
@@ -45,11 +45,11 @@ def parse_time_with_unit_us(text: str) -> int:
 
 
 def us_of(duration: int | str) -> int:
-    """Return a duration in microseconds.
+    """Return a duration in microseconds, given as a whole number or as text such as `1.5s`.
 
     Raises:
-        TypeError: the number is not whole.
-        ValueError: the text is not a time or has no unit, or the number is negative.
+        TypeError: the duration is neither a whole number nor a text.
+        ValueError: the text is not a time or has no unit, or the duration is negative.
 
     >>> us_of("1.5s"), us_of(250)
     (1500000, 250)
@@ -94,7 +94,7 @@ MOST_PORT: Final = 0xFFFF
 
 
 def parse_port(text: str) -> int | None:
-    """Read a TCP port, 0..65535, with any number of digits. Return None if it is invalid.
+    """Parse a TCP port, 0..65535, also with leading zeros. Return None for any other text.
 
     >>> parse_port("7000"), parse_port("007000"), parse_port("0100000"), parse_port("-1")
     (7000, 7000, None, None)
@@ -135,7 +135,7 @@ Setting = int | float | str
 
 
 def parse_setting(word: str) -> Setting:
-    """Convert a text to a number if it looks like one. Otherwise return the text itself.
+    """Convert the text of an input's value to a number if possible. Otherwise return the text.
 
     >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
     [5, -31, 0.001, 'ready', 'nan']

@@ -14,11 +14,11 @@ from tickrig.host.text.log import log_of
 
 
 def check_file(path: Path, what: str) -> None:
-    """Check before a run that a file can be written after the run.
+    """Check before a run that its output file can be written at the end.
 
     Args:
         path: path of the file.
-        what: name of the file in messages, such as `report` or `--html`.
+        what: name of the file in messages, such as `report` or the option `--html`.
 
     Raises:
         ValueError: the folder of the file does not exist or is not writable, or the path is a
@@ -36,15 +36,15 @@ def check_file(path: Path, what: str) -> None:
 
 
 def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
-    """Check that a file is not one of those that a run reads.
+    """Check that an output file would not overwrite a file that the run reads.
 
     Args:
-        path: path of the file.
-        what: name of the file in messages, such as `--html`.
-        inputs: paths that the run reads. Paths that are not files are ignored.
+        path: path of the output file.
+        what: name of the output file in messages, such as `--html`.
+        inputs: paths that the run reads. Those that are not files are ignored.
 
     Raises:
-        ValueError: the file is one of the inputs.
+        ValueError: the output file is one of the inputs.
     """
     if any(_are_one(path, each) for each in inputs):
         raise ValueError(f"{what} {path}: the run reads this file, it would be overwritten")
@@ -58,15 +58,17 @@ def _are_one(path: Path, other: Path) -> bool:
 
 
 def is_special(path: Path) -> bool:
-    """Return whether a path is neither a file nor a folder, such as a pipe."""
+    """Return whether a path exists and is neither a file nor a folder, such as a pipe."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def check_writable(folder: Path) -> None:
-    """Check by a test file that files can be made in a folder. The folder need not exist.
+    """Check that files can be created in a folder, by creating a temporary file.
+
+    If the folder does not exist yet, the nearest existing folder above it is checked.
 
     Raises:
-        OSError: no file can be made in the folder.
+        OSError: no file can be created in the folder.
     """
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
@@ -79,7 +81,10 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Replace a file once the new content is on the disk. A pipe or similar is written directly.
+    """Write a file such that it never has a part of the new content only.
+
+    The content is first written to a temporary file, which then replaces the file. A pipe or
+    another special file is written directly.
 
     Raises:
         OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged.
@@ -91,10 +96,11 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a path for new content. At the end of the block, the new file replaces the given file.
+    """Context manager that yields a temporary path for new content, which then replaces a file.
 
-    The new file has the same name and is in a new folder next to the given file. If the path is not
-    a regular file, for example a pipe, the path itself is yielded.
+    The temporary file has the same name as the file, in a new folder next to it. It replaces the
+    file at the end of the block. If the file is not a regular file, for example a pipe, its own
+    path is yielded.
 
     Raises:
         OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged. An
@@ -152,17 +158,18 @@ _BINARY: Final[int] = getattr(os, "O_BINARY", 0)
 
 
 class LineFile:
-    """A text file in which each line is written at once, so that killing the process loses no line.
+    """Text file to which lines are written at once, so that killing the process loses no line.
 
-    If writing fails, the recording ends with one warning, and the run continues.
+    It is used for recordings. If writing fails, the recording ends with one warning, and the run
+    continues.
 
     Args:
         path: path of the file. An existing file is replaced.
         first: first line of the file.
-        running: description of what continues without the recording, used in the warning.
+        running: noun for what continues without the recording, used in the warning.
 
     Attributes:
-        error: reason for the early end of the recording, empty if there was no error.
+        error: reason why the recording has ended early, empty if it has not.
 
     Raises:
         OSError: the file cannot be opened.

@@ -55,14 +55,14 @@ _MEANT: Final = {
 
 
 def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...]]:
-    """Read a YAML text.
+    """Parse a YAML text to a tree of items with line numbers.
 
     Args:
         text: content of the whole file.
-        name: name of the file for error messages.
+        name: name of the file, for error messages.
 
     Returns:
-        The content as a tree, or None if the text has no content, and the errors.
+        The tree, or None if the text is empty or cannot be parsed, and the errors.
     """
     try:
         root = _composed(text)

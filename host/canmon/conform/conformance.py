@@ -57,11 +57,11 @@ _HTML: Final = "--html"
 def _check_files(files: Mapping[str, Path]) -> None:
     """Check before the run that all output files of the command can be written.
 
-    Raises:
-        Refused: a file cannot be written.
-
     Args:
         files: path of each output file by its option, such as `--html`.
+
+    Raises:
+        Refused: a file cannot be written.
     """
     for option, path in files.items():
         with refusing():

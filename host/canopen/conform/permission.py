@@ -88,12 +88,12 @@ class Permission:
     def check_write(self, index: int, *, refused: bool = False) -> None:
         """Check that the run may write an object.
 
-        Raises:
-            NotAllowed: the level or the options of the run do not allow the write.
-
         Args:
             index: index of the object, 0x0000..0xFFFF.
             refused: whether the check expects the node to refuse the write.
+
+        Raises:
+            NotAllowed: the level or the options of the run do not allow the write.
         """
         self._check_never(index)
         if index in PROGRAMS:

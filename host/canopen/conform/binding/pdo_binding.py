@@ -152,16 +152,13 @@ def bind_pdos(
     The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks send
     no data to other RPDOs while these have their original mapping.
 
-    Returns:
-        The PDO of each name, and for each name without a PDO a text that explains why.
-
     Args:
         device: device that the EDS describes.
         reader: reader for the objects of the node.
         may_write: function that returns whether the run may write an object, by its index.
 
     Returns:
-        The PDOs that were found, and the reasons for the missing ones, by name.
+        The PDO of each name, and for each name without a PDO a text that explains why.
     """
     bound: dict[str, BoundPdo] = {}
     reasons: dict[str, str] = {}

@@ -446,13 +446,13 @@ class BusExchange:
     def period(self, pattern: str, each_ms: int, times: int) -> None:
         """Measure the period of frames that match a pattern, for example of a heartbeat.
 
-        Raises:
-            StepFailed: the mean period is not the expected one, or too few frames arrive.
-
         Args:
             pattern: pattern of the frames.
             each_ms: expected period in milliseconds.
             times: number of periods to measure.
+
+        Raises:
+            StepFailed: the mean period is not the expected one, or too few frames arrive.
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
         if wrong := _off_period(stamps, each_ms, times, self.resolution_us):

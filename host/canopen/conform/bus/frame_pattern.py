@@ -37,6 +37,9 @@ def matches(pattern: str, text: str) -> bool:
 
     In a pattern, a dot stands for any digit, `[..]` for one of the digits in it, and `*` for any
     rest of the frame.
+
+    >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
+    (True, True)
     """
     return _compiled(pattern).fullmatch(text) is not None
 
@@ -76,7 +79,11 @@ def unlike(got: str, wanted: Sequence[str]) -> str:
 
 
 def abort_of(got: str) -> int | None:
-    """Return the abort code in a frame in candump notation, or None if it is no SDO abort."""
+    """Return the abort code in a frame in candump notation, or None if it is no SDO abort.
+
+    >>> f"{abort_of('585#8000100002000106'):08X}", abort_of("705#00")
+    ('06010002', None)
+    """
     match = _ABORT.fullmatch(got)
     return int(_code(match[2]), 16) if match and match[2].isalnum() else None
 

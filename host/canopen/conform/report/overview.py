@@ -109,7 +109,11 @@ def frame_of(line: FrameLine) -> CanFrame | None:
 
 
 def cut(lines: list[str], most: int) -> list[str]:
-    """Shorten a text to `most` lines: its beginning, the number of omitted lines, and its end."""
+    """Shorten a text to `most` lines: its beginning, the number of omitted lines, and its end.
+
+    >>> cut(["a", "b", "c", "d", "e"], 3)
+    ['a', '... 3 more lines ...', 'e']
+    """
     if len(lines) <= most:
         return lines
     head, tail = most // 2, most - most // 2 - 1

@@ -92,7 +92,13 @@ _COUNTED: Final = re.compile(r"NrOfEntries|Lines|ProductVersion|ProductRevision"
 
 
 def is_number(section: str, key: str) -> bool:
-    """Return whether the value of a keyword is a number, whatever the object's data type is."""
+    """Return whether the value of a keyword is a number, whatever the object's data type is.
+
+    >>> is_number("DeviceInfo", "VendorNumber"), is_number("1600Value", "NrOfEntries")
+    (True, True)
+    >>> is_number("DeviceInfo", "VendorName"), is_number("1017", "DefaultValue")
+    (False, False)
+    """
     if object_section(section) is not None or is_module_object(section):
         return key.lower() in _OBJECT_NUMBERS
     if (known := _NUMBERS.get(section)) is not None:
@@ -118,6 +124,9 @@ def numbered(section: str, key: str) -> str | None:
     """Return the correct spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`.
 
     The result is None if the section has no such keywords.
+
+    >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
+    ('Line5', 'Dummy001B', None)
     """
     pattern = _KEYS.get(section)
     if pattern is None or not pattern.fullmatch(key):

@@ -124,7 +124,7 @@ class DriveMode:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the target to the drive. Return False, so that the drive halts, if there is none."""
+        """Write the target to the drive. Return False if there is none: the drive then halts."""
         yield from ()
         return False
 
