@@ -64,11 +64,11 @@ def state_of(frame: CanFrame) -> NmtState | None:
 
 
 class ErrorControl:
-    """Monitors one node by its heartbeat or by node guarding, to detect that the node is lost.
+    """Monitor that detects the loss of one node by its heartbeat or by node guarding.
 
     Args:
-        heartbeat_us: time without a heartbeat after which the node is lost, in microseconds, or 0
-            to not monitor the heartbeat.
+        heartbeat_us: time without a heartbeat after which the node is lost, in microseconds. 0
+            disables the monitoring of heartbeats.
         guard_us: period of node guarding requests in microseconds, or 0 for none.
         life_time_factor: number of requests without an answer after which the node is lost.
         request: function that sends a node guarding request.

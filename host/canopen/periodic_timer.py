@@ -16,7 +16,7 @@ class PeriodicTimer:
     [False, True, False, True, False, True]
 
     Args:
-        period_us: period, or 0 for none.
+        period_us: period in microseconds, or 0 for a timer that never ends.
 
     Attributes:
         due_us: end of the current period, or `NEVER` before the start and if the period is 0.

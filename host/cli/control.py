@@ -80,7 +80,9 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 def serving_control(
     path: Path, dispatcher: RequestDispatcher, clock: _Waiting
 ) -> Iterator[ControlServer]:
-    """Serve a control socket in the block, and yield the server. It works while the clock waits.
+    """Context manager that creates a control socket and yields its server.
+
+    The server answers requests while the clock waits.
 
     Args:
         path: path of the socket to create.

@@ -70,7 +70,9 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 def refusing(
     what: str = "", wrong: type[ValueError] = ValueError, *, path: Path | None = None
 ) -> Iterator[None]:
-    """Context manager that turns errors of its block into Refused. An OSError gives its path.
+    """Context manager that turns errors of its block into Refused, which ends the command.
+
+    For an OSError, the message contains its path and reason, as in `refuse_path`.
 
     Args:
         what: invalid option or argument, with which the message starts.

@@ -212,9 +212,10 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise an error again if it came from writing standard output, so that nothing reports it.
+    """Raise an error again if it came from writing standard output. Otherwise do nothing.
 
-    If the reader has closed the pipe, as before `| head`, the command then ends without a message.
+    The caller can then report only errors of other kinds. If the reader has closed the pipe, as
+    before `| head`, the command ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]

@@ -27,7 +27,7 @@ class ControlClient:
         timeout_s: time to wait for each answer, in seconds.
 
     Raises:
-        OSError: no emulator listens at the path.
+        OSError: no emulator listens at the path, or the emulator does not answer.
     """
 
     def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
@@ -46,7 +46,7 @@ class ControlClient:
         Raises:
             ControlRefused: the emulator refused the request.
             OSError: the emulator does not answer in time, or has closed the connection.
-            ValueError: the answer is not a valid JSON object.
+            ValueError: the answer is invalid.
         """
         request = json.dumps({"v": VERSION, "do": do, **fields})
         self._socket.sendall(request.encode() + b"\n")

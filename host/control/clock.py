@@ -20,7 +20,10 @@ class RealClock:
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, t_us: int, /) -> int:
-        """Sleep until a time. A time that has passed ends the sleep at once: a late rig catches up.
+        """Sleep until a time.
+
+        If the time has passed already, the method returns at once, so that a late rig catches up
+        without skipping ticks.
 
         Args:
             t_us: time in microseconds since the first wait.

@@ -65,10 +65,11 @@ class _Readable(Protocol):
 
 
 class LineServer:
-    """Server that answers lines of text of many clients, without threads. It works during `serve`.
+    """Server that answers lines of text from many clients, without threads.
 
-    In each round, the server answers at most one line of each client. If a client does not read its
-    answers, the server stops reading its requests.
+    The server works only during calls of `serve`. In each round, it answers at most one line of
+    each client. If a client does not read its answers, the server stops reading the requests of
+    this client.
 
     Args:
         listener: non-blocking listening socket, which the server closes.
@@ -247,7 +248,9 @@ class _Client:
 
 
 class ControlServer(LineServer):
-    """Server for a control socket, which clients use to control a run. It works during `serve`.
+    """Server for a control socket, over which clients control a run.
+
+    The server works only during calls of `serve`.
 
     Args:
         path: path at which the socket is created. A socket left by a killed process is replaced.

@@ -298,8 +298,8 @@ class BusReceiver:
             timeout_s: longest wait in seconds, or None to wait without limit.
 
         Raises:
-            LinkClosed: the connection to the bus is lost, or 100 reads in a row have failed over 1
-                s.
+            LinkClosed: the connection to the bus is lost, or 100 reads in a row have failed during
+                1 s.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
         for _ in range(_TRIES):

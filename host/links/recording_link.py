@@ -128,7 +128,7 @@ class RecordingLink(Generic[W]):
     def close(self) -> None:
         """Complete the trace with the duration of the recording, and close the link.
 
-        A second call does nothing.
+        You may call this method again.
         """
         with self._lock:
             end_us = max(self._link.now_us - self._start_us, self._latest_us)

@@ -63,8 +63,8 @@ _LOOK_S: Final = 0.5
 class TerminalOutput:
     """Writer that outputs text from its own thread, so that a stuck terminal blocks nothing else.
 
-    A terminal is stuck while it is stopped, or while its connection hangs. Text that does not fit
-    into the queue is then dropped.
+    A terminal is stuck while its program is stopped, or while its connection hangs. Text that does
+    not fit into the queue is then dropped.
 
     Args:
         descriptor: file descriptor of the terminal. The writer uses a duplicate of it.

@@ -250,7 +250,7 @@ class Notes:
     names: Mapping[TomlPath, str] = field(default_factory=dict)
 
     def wrong(self, keys: TomlPath, reason: str) -> None:
-        """Add an error for the value at these keys."""
+        """Add an error about the value at the given keys."""
         line = self.document.line_of(keys)
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
@@ -380,7 +380,7 @@ def in_a_line(mistakes: Sequence[Mistake]) -> str:
 
 
 def is_broken(value: object) -> bool:
-    """Return whether a value contains invalid TOML, so that an error about it already exists."""
+    """Return whether a value contains invalid TOML. Such a value has been reported already."""
     match value:
         case dict():
             return any(map(is_broken, value.values()))

@@ -14,7 +14,7 @@ from tickrig.host.text.log import log_of
 
 
 def check_file(path: Path, what: str) -> None:
-    """Check before a run that its output file can be written at the end.
+    """Check before a run that an output file can be written at the end of the run.
 
     Args:
         path: path of the file.
@@ -81,7 +81,7 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file such that it never has a part of the new content only.
+    """Replace the content of a file in one step, so that the file is never incomplete.
 
     The content is first written to a temporary file, which then replaces the file. A pipe or
     another special file is written directly.

@@ -75,7 +75,7 @@ class BusFileSection:
         name: path of keys to the section, as shown to the user.
         item: YAML mapping with the values. A value that is not a mapping is reported, and counts as
             an empty mapping.
-        place: file and line of the key that the section belongs to.
+        place: file and line of the key whose value is this section.
     """
 
     def __init__(self, notes: BusFileNotes, name: str, item: Item, place: FilePlace) -> None:

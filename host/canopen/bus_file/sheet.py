@@ -102,7 +102,7 @@ class Sheet:
 
 
 class Sheets:
-    """Finder of the EDS or DCF file of each node in a bus.yml.
+    """Finder that locates and reads the EDS or DCF file of each node in a bus.yml.
 
     Args:
         folder: folder that contains the bus.yml.

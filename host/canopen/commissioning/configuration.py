@@ -25,9 +25,9 @@ _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
 
 
 def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
-    """Return the values to which a DCF configures a node, by index and sub-index.
+    """Return the values to which a DCF sets the objects of a node, by index and sub-index.
 
-    These are the keys ParameterValue of the objects that can be written.
+    A DCF has these values in the keyword ParameterValue of the objects that can be written.
 
     Args:
         file: sections of the DCF.

@@ -190,10 +190,10 @@ class LssMaster:
     def configure_bit_rate(self, bit_rate: int) -> None:
         """Set the bit rate of the slave that is in the LSS state configuration.
 
+        The method raises the same errors as `configure_node_id`.
+
         Args:
             bit_rate: bit rate in bit/s, one of `INDICES`.
-
-        The method raises the same errors as `configure_node_id`.
         """
         number = STANDARD_TABLE | INDICES[bit_rate] << 8
         self._configure(message(LssCommand.CONFIGURE_BIT_TIMING, number))

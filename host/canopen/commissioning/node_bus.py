@@ -164,7 +164,7 @@ class NodeFound:
         name: device name (object 1008h), empty if the node has none.
         state: last NMT state that the node has reported, or None if it has reported none.
         answers: number of answers to one SDO request. 2 means that two nodes share this node-ID.
-        heartbeat_ms: producer heartbeat time (object 1017h), or None if the node has none.
+        heartbeat_ms: producer heartbeat time in ms (object 1017h), or None if the node has none.
     """
 
     node_id: int

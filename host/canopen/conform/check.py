@@ -35,7 +35,8 @@ class Send:
 class Expect:
     """Step that waits for a frame of the node, which must match one of the patterns.
 
-    The next frame with the CAN-ID of the patterns is compared, and other frames are ignored.
+    The next frame with the CAN-ID of the patterns is compared. Frames with other CAN-IDs are
+    ignored.
     """
 
     patterns: tuple[str, ...]

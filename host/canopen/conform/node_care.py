@@ -138,7 +138,7 @@ class KnownState:
         self._write_back(self._begin, [at for at in addresses if at in self._begin])
 
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
-        """Give the objects that a reset has changed the values with which each check begins.
+        """Restore the objects that a reset has changed to the values with which each check begins.
 
         The first reset of a kind shows which objects it changes. After later resets of this kind,
         only these objects and the objects written since then are read. Reading all objects each

@@ -122,7 +122,7 @@ class BootStep:
     Attributes:
         request: request that the master sent, or event that the master waited for.
         answer: answer of the slave.
-        meaning: what follows from the answer.
+        meaning: consequence of the answer for the boot-up.
     """
 
     request: str

@@ -119,7 +119,7 @@ class CanopenMaster(Closing):
     def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
         """Let time pass until a condition holds, or until a time limit.
 
-        Meantime, the master does its work.
+        The master does its work during this time.
 
         Args:
             done: function that returns whether the condition holds.

@@ -38,9 +38,9 @@ class BoundPdo(PdoDescription):
     """PDO of the node under test that replaces a name such as `$tpdo` in a conformance check.
 
     Attributes:
-        index: index of its communication parameter, from 1400h for an RPDO or from 1800h for a
-            TPDO.
-        subs: sub-indices that the communication parameter has.
+        index: index of the PDO's communication parameter, from 1400h for an RPDO or from 1800h for
+            a TPDO.
+        subs: sub-indices of the PDO's communication parameter.
         remappable: whether the mapping and the COB-ID of the PDO can be written.
         places: number of objects that the PDO can map.
         restless: whether the PDO has an inhibit time or an event timer that cannot be switched off.

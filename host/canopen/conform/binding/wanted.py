@@ -76,7 +76,8 @@ class WantedObject(NamedTuple):
     Attributes:
         name: name as in checks, without its `$`.
         what: description of the object, for messages.
-        use: use of the object in checks: read, written, or written in vain.
+        use: use of the object in checks: it is read, written and restored, or written although the
+            node must refuse it.
         access: bit mask of access rights, and the required value of these bits.
         kinds: numbers of the allowed data types, or None for any type.
         limited: whether the object must have a low and a high limit, with values of its data type

@@ -405,10 +405,14 @@ class BusExchange:
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
-        """Wait for the next frame with a CAN-ID, and return it in candump notation.
+        """Wait for the next frame with a CAN-ID. It must match one of the patterns.
+
+        Args:
+            patterns: patterns of the allowed frames, all with the same CAN-ID.
+            within_ms: time limit in milliseconds.
 
         Returns:
-            The received frame.
+            The received frame in candump notation.
 
         Raises:
             StepFailed: no frame arrives within the time limit, or the frame matches no pattern.

@@ -32,7 +32,7 @@ _GROUP: Final = re.compile(r"\(.*\)")
 def issue_text(
     report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the failures of a run as a Markdown page, for an issue at the maker of the device.
+    """Return the failures of a run as a Markdown page, for an issue to the maintainer of a stack.
 
     For each failure it contains the requirement, the answer of the node, the frames, and a script
     that reproduces the failure.
