@@ -57,7 +57,7 @@ class DeviceEntry:
         node_id: node-ID of a CANopen node, or None for another device.
         sha256: SHA-256 of the file in `type`.
         files: SHA-256 of each file that the file in `type` references, by name.
-        stored: content of the device's non-volatile memory at the start.
+        stored: content of the device's non-volatile memory.
     """
 
     wire: str

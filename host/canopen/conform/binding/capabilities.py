@@ -70,7 +70,8 @@ class EdsClaims(NamedTuple):
     Attributes:
         lss: whether the node supports LSS.
         dummies: names of the features for the dummy objects that the node allows in a PDO mapping.
-        identity: numbers of the identity object 1018h by sub-index, from the section DeviceInfo.
+        identity: first numbers of the identity object 1018h by sub-index, from the section
+            DeviceInfo.
     """
 
     lss: bool
