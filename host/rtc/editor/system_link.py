@@ -82,8 +82,10 @@ class SystemLink:
         The thread calls this method.
         """
         while not self._requests.empty():
-            if (request := self._requests.get()) is not None:
-                request()
+            if (request := self._requests.get()) is None:
+                self._requests.put(None)  # `_run` ends at it
+                break
+            request()
         answer = self._request("describe")
         if isinstance(answer, str):
             self.problem = answer
