@@ -37,12 +37,15 @@ _LOOKED_AT = 4096
 
 
 def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documents.Document:
-    """Read a file. Raise Refused if it is unreadable, too large, binary, or a bus.yml.
+    """Read an EDS, DCF, XDD or XDC file for a command of `canmon`.
 
     Args:
         path: path of the file.
-        what: argument or option that names the file.
+        what: argument or option of the command line that named the file, for error messages.
         encoding: Python name of the file's encoding, or empty to detect the encoding.
+
+    Raises:
+        Refused: the file is unreadable, too large, binary, or a bus.yml.
     """
     with refusing(what, path=path), refusing(what, eds_file.EdsError):
         data = eds.read_eds_bytes(path)
@@ -74,7 +77,10 @@ _IDENTITY: Final = 0x1018
 
 
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
-    """Return the identity of a node (1018h), or None if it does not send vendor or product."""
+    """Read the identity object (1018h) of a node with SDO.
+
+    The result is None if the node does not send its vendor or its product.
+    """
     numbers = [read_number(bus, node_id, _IDENTITY, sub) for sub in (1, 2, 3)]
     return eds_folder.node_identity(numbers)
 
@@ -88,10 +94,11 @@ def read_number(bus: NodeBus, node_id: int, index: int, sub: int, size: int = 4)
 
 
 def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
-    """Return the EDS of a node, either the given file, or the file of a folder that fits it.
+    """Return the path of the EDS that describes a node, or None if there is none.
 
-    If a folder is given, a line on standard error names the chosen file, or reports that no file
-    fits.
+    If `eds` is a file, the function returns that file. If `eds` is a folder, the function reads the
+    identity of the node (1018h) and returns the file in the folder that fits it. A line on standard
+    error then names the chosen file, or reports that no file fits.
 
     Raises:
         LinkClosed: the bus is gone.
@@ -122,9 +129,10 @@ eds_folder_option: Final = click.option(
 def node_eds_option(
     what: str = "EDS, DCF or XDD of the node.",
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds `--eds FILE` and `--eds-dir`, together as `eds`.
+    """Return a decorator that adds `--eds FILE` and `--eds-dir DIR` to a command for one node.
 
-    The value of `eds` is a path, a folder, or None.
+    The command receives both options in one argument `eds`, which is the path of a file, a folder,
+    or None.
 
     Args:
         what: help text of `--eds`.
@@ -147,9 +155,10 @@ def node_eds_option(
 
 
 def read_eds_folders(folders: Sequence[Path]) -> eds_folder.EdsFolder | None:
-    """Return the folders of `--eds-dir`, or None without the option.
+    """Return the folders that `--eds-dir` names, or None if the option is not given.
 
-    Raise Refused for other paths.
+    Raises:
+        Refused: a path is not a readable folder.
     """
     for folder in folders:
         try:
@@ -169,15 +178,17 @@ def read_eds_paths(
     folders: Sequence[Path] = (),
     notify: Callable[[str], None] = say,
 ) -> eds_folder.EdsFiles:
-    """Read EDS files by node-ID. Raise Refused if a file cannot be read, or is not an EDS.
+    """Read EDS files, of which each describes the node with one node-ID.
 
-    The function reports mistakes in a file on standard error, and does not use the entries with
-    mistakes.
+    Mistakes in a file are reported on standard error, and the entries with mistakes are not used.
 
     Args:
         paths: path of each file by node-ID.
-        folders: folders to search for files of other nodes.
-        notify: function that is called with a line about each choice of a file.
+        folders: folders with EDS files of further nodes, which are chosen by the node's identity.
+        notify: function that is called with a line of text about each choice of a file.
+
+    Raises:
+        Refused: a file cannot be read, or is not an EDS.
     """
     found = {node: _read(node, path) for node, path in paths.items()}
     if found:
@@ -186,7 +197,11 @@ def read_eds_paths(
 
 
 def eds_paths(words: Sequence[str]) -> dict[int, Path]:
-    """Return the files that `--eds` names, by node-ID. Raise Refused if a word is wrong."""
+    """Parse the values `NODE=FILE` of the option `--eds`. Return the path of each file by node-ID.
+
+    Raises:
+        Refused: a value does not have this form.
+    """
     return {node: path for word in words for node, path in _split(word).items()}
 
 

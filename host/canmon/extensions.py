@@ -40,11 +40,15 @@ _DECODERS: Final = ExtensionGroup[Any](
 
 
 def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
-    """Return a decoder that calls the decoders of installed packages first.
+    """Return a decoder of CAN frames that first asks the decoders that installed packages provide.
+
+    Args:
+        eds: objects from the EDS of each node, by node-ID.
+        dbc: DBC files that name further messages and signals.
 
     Raises:
         OSError: a DBC file cannot be read.
-        DbcError: the DBC file is malformed, or cantools is not installed.
+        DbcError: a DBC file is malformed, or cantools is not installed.
     """
     from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - slow
 
@@ -59,10 +63,12 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
 
 
 def load_rule(name: str) -> Callable[[], Rule]:
-    """Return the factory of a check rule of an installed package.
+    """Return the function that makes a rule of `canmon check`.
+
+    An installed package provides the rule.
 
     Raises:
-        ExtensionError: the rule does not exist, or cannot be used.
+        ExtensionError: no package has a rule of this name, or the rule cannot be used.
     """
     try:
         found = _DECODERS.load(name)

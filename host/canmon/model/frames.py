@@ -56,13 +56,13 @@ AnyFrame = CanFrame | ErrorFrame | FdFrame
 
 
 class Record(NamedTuple):
-    """One frame, CAN FD frame or error frame on the bus.
+    """A frame on the bus with its time: a classic CAN frame, a CAN FD frame or an error frame.
 
     Attributes:
-        at_us: time in microseconds at which the frame ended. In logs and on real buses it counts
-            from the epoch (1970).
-        channel: name of the bus, without blanks.
-        frame: frame on the bus.
+        at_us: time in microseconds at which the frame ended. In logs and on real buses, the time
+            counts from the epoch (1970).
+        channel: name of the bus, such as `can0`, without blanks.
+        frame: the frame itself.
         sent: whether this program sent the frame.
     """
 
@@ -73,14 +73,14 @@ class Record(NamedTuple):
 
 
 class LineRecord(NamedTuple):
-    """A message of a serial line.
+    """A message on a serial line with its time: the counterpart of `Record`, which is a CAN frame.
 
-    A trace can contain it and `Record`, and filters accept both types.
+    A trace can contain both types, and filters accept both.
 
     Attributes:
-        at_us: time of the last byte.
+        at_us: time of the last byte in microseconds.
         channel: name of the line.
-        sent: whether the host sent the message to the device.
+        sent: whether the host sent the message to the device. Otherwise, the device sent it.
         data: bytes of the message, without line end or header.
         decoded: decoded meaning of the message.
     """
@@ -109,7 +109,7 @@ FD: Final = 1 << 33
 
 
 def ident_of(frame: CanFrame) -> int:
-    """Return the CAN-ID with a bit for an extended frame and a bit for a remote frame.
+    """Return the CAN-ID of a frame with two flags: one bit for extended, one bit for remote frames.
 
     >>> hex(ident_of(CanFrame.parse("00000605#R")))
     '0xc0000605'
@@ -118,7 +118,7 @@ def ident_of(frame: CanFrame) -> int:
 
 
 def fd_ident(frame: FdFrame) -> int:
-    """Return the CAN-ID with a bit for an extended frame and a bit for a CAN FD frame.
+    """Return the CAN-ID of a CAN FD frame with two flags: one bit for extended, one bit for CAN FD.
 
     >>> hex(fd_ident(FdFrame.parse("00000605##1")))
     '0x280000605'
@@ -143,7 +143,9 @@ def frame_of(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
 
 
 def ident_text(ident: int) -> str:
-    """Return an identifier as candump writes it, with R for remote and # for CAN FD frames.
+    """Return the text of an identifier with flags, in candump's notation.
+
+    An R after the CAN-ID marks a remote frame, and a # marks a CAN FD frame.
 
     >>> ident_text(0x181), ident_text(0xC000_0605), ident_text(FD | 0x181)
     ('181', '00000605R', '181#')
@@ -153,9 +155,10 @@ def ident_text(ident: int) -> str:
 
 
 def parse_ident(text: str) -> int:
-    """Read an identifier that `ident_text` wrote.
+    """Parse the text of an identifier, which `ident_text` wrote.
 
-    An 11-bit identifier has 3 digits, a 29-bit identifier has 8.
+    The result is the CAN-ID with flags. An 11-bit CAN-ID has 3 hex digits, and a 29-bit CAN-ID has
+    8.
 
     Raises:
         ValueError: the text is not an identifier.
@@ -182,9 +185,10 @@ _SENDING: Final = frozenset([1, 3, 5, 7, 9, 11, 14])
 
 
 def node_of(ident: int) -> int | None:
-    """Return the node-ID of an identifier, or None if it has none by default.
+    """Return the node-ID that a CAN-ID belongs to in CANopen's predefined connection set.
 
-    A configured COB-ID may belong to another node.
+    The result is None for CAN-IDs without a node-ID. A node whose COB-IDs were configured
+    differently may use a CAN-ID that belongs to another node by default.
 
     >>> node_of(0x181), node_of(0x701), node_of(0x080), node_of(0x7E5)
     (1, 1, None, None)
@@ -195,7 +199,10 @@ def node_of(ident: int) -> int | None:
 
 
 def sender_of(ident: int) -> int | None:
-    """Return the node-ID that sends an identifier by default, or None if there is none.
+    """Return the node-ID of the node that sends a CAN-ID by default in CANopen.
+
+    The result is None for a CAN-ID that no node-ID is assigned to send, such as 201h, which node 1
+    receives.
 
     >>> sender_of(0x181), sender_of(0x581), sender_of(0x201), sender_of(0x701 | REMOTE)
     (1, 1, None, None)
@@ -218,14 +225,15 @@ def flagged_id(record: Record) -> int:
 
 @dataclass(frozen=True, slots=True)
 class CandumpFilter:
-    """A filter that selects frames by rules of candump.
+    """A filter of CAN frames in the notation of candump, such as `123:7FF,400~700,#FF`.
 
-    As in candump, a frame passes if it matches one rule. With `j` among the words, it must match
-    all rules. Without a rule, all frames pass. Error frames pass only by `#MASK`.
+    A frame passes if it matches at least one rule. If `j` is one of the words, the frame must match
+    all rules. Without a rule, all frames pass. An error frame passes only if `#MASK` selects its
+    class.
 
     Attributes:
-        rules: identifier, mask, and whether the rule is inverse, for each rule.
-        error_mask: classes of error frames that pass.
+        rules: CAN-ID, mask, and whether the rule is inverse, for each rule.
+        error_mask: bit mask of the classes of error frames that pass.
         joined: whether a frame must match all rules.
     """
 
@@ -235,7 +243,11 @@ class CandumpFilter:
 
     @classmethod
     def parse(cls, text: str) -> CandumpFilter:
-        """Read the words after a bus. Raise ValueError if a word is not a filter."""
+        """Parse a filter, which is a list of words between commas such as `123:7FF,#FF`.
+
+        Raises:
+            ValueError: a word is not a filter.
+        """
         rules, error_mask, joined = [], 0, False
         for word in text.split(","):
             if rule := _RULE.fullmatch(word):
@@ -262,7 +274,9 @@ class CandumpFilter:
 
 
 def ms_text(time_us: int | None) -> str:
-    """Return a time in milliseconds as text, with at most 8 characters up to 11 days.
+    """Return a time span in milliseconds as text, or `-` for None.
+
+    The text has at most 8 characters for spans up to 11 days.
 
     >>> ms_text(None), ms_text(1_234), ms_text(999_999), ms_text(12_345_678)
     ('-', '1.234', '999.999', '12345.7')
@@ -275,7 +289,7 @@ def ms_text(time_us: int | None) -> str:
 
 
 def s_text(time_us: int) -> str:
-    """Return an age in seconds as text. A time in the future has no age.
+    """Return an age in seconds as text. A negative age, of a time in the future, is shown as 0.0.
 
     >>> s_text(-5), s_text(12_340_000), s_text(123_456_000_000)
     ('0.0', '12.3', '123456')
@@ -293,7 +307,7 @@ def rate_text(per_s: float) -> str:
 
 
 def load_text(bits_s: int, bit_rate: int | None) -> str:
-    """Return a load as text, in percent of the bit rate if that is known, or in bits per second.
+    """Return a bus load as text, in percent of the bit rate, or in bits per second if that is None.
 
     >>> load_text(123_456, 1_000_000), load_text(123_456, None)
     ('12.3 %', '123.5 kbit/s')
@@ -329,14 +343,15 @@ STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
 def stamp_text(
     stamp: Stamp, at_us: int, origin_us: int, before_us: int, digits: tuple[int, int] = (1, 1)
 ) -> str:
-    """Return a time as text.
+    """Return the time of a frame as text, in one of the time formats that candump has.
 
     Args:
         stamp: format of the time.
-        at_us: time to write.
+        at_us: time to write, in microseconds.
         origin_us: time of the first frame.
         before_us: time of the previous item.
-        digits: least number of digits before the point, of a time and of a span.
+        digits: least number of digits before the decimal point, first for a time, then for a span
+            between two times.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
@@ -349,19 +364,20 @@ def stamp_text(
 
 
 class DumpLines:
-    """Writer that makes one line from each frame.
+    """Formatter of the lines that `canmon dump` prints, one line for each frame.
 
-    After a first 29-bit identifier, 11-bit identifiers are indented.
+    After the first 29-bit identifier, 11-bit identifiers are indented so that the columns align.
 
     Args:
-        stamp: format of the time before a frame.
-        extra: whether to show if the frame was received or sent, and B and E for BRS and ESI.
+        stamp: format of the time at the beginning of each line.
+        extra: whether to show the direction (RX or TX), and B and E for the CAN FD bits BRS and
+            ESI.
 
     Attributes:
-        form: format of the time before a frame.
-        first_us: time of the first frame, or None before it.
+        form: format of the time at the beginning of each line.
+        first_us: time of the first frame, or None before the first frame.
         last_us: time of the last frame.
-        width: number of digits of identifiers.
+        width: width of the identifier column in digits.
     """
 
     def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
@@ -427,7 +443,7 @@ DATED_US: Final = 1_000_000_000_000_000
 def date_text(at_us: int) -> str:
     """Return a time since the epoch as local date and time.
 
-    A time after the year 9999 has no date.
+    A time after the year 9999 is written as seconds since the epoch.
     """
     from datetime import datetime  # noqa: PLC0415 - seldom wanted
 
@@ -439,12 +455,13 @@ def date_text(at_us: int) -> str:
 
 
 class LogTime(NamedTuple):
-    """A moment of a log, as the user wrote it.
+    """A point in time in a log, as the user wrote it for an option such as `--from` or `--to`.
 
     Attributes:
-        us: microseconds since the epoch if `dated`, otherwise after the first frame of the log.
-        dated: whether the moment is a date, or seconds since the epoch.
-        text: text of the moment.
+        us: microseconds since the epoch if `dated` is set, otherwise since the first frame of the
+            log.
+        dated: whether the user gave a date or seconds since the epoch.
+        text: the text that the user wrote.
     """
 
     us: int
@@ -452,7 +469,10 @@ class LogTime(NamedTuple):
     text: str
 
     def after(self, first_us: int) -> int:
-        """Return the moment on the clock of a log whose first frame has this time."""
+        """Return this point in time, in microseconds on the clock of a log.
+
+        `first_us` is the time of the first frame of the log.
+        """
         return self.us if self.dated else first_us + self.us
 
 
@@ -461,12 +481,13 @@ _EPOCH_S: Final = 1_000_000_000
 
 
 def parse_log_time(text: str) -> LogTime:
-    """Parse a moment of a log: time after its first frame, a date, or seconds since the epoch.
+    """Parse a point in time in a log.
 
-    A date without a zone is in the zone of this machine, as displayed.
+    The text is a span after the first frame, a date, or a number of seconds since the epoch. A date
+    without a time zone is in the zone of this machine, in which times are also displayed.
 
     Raises:
-        ValueError: the text is not such a moment.
+        ValueError: the text has none of these forms.
 
     >>> parse_log_time("2.5"), parse_log_time("300ms").us
     (LogTime(us=2500000, dated=False, text='2.5'), 300000)

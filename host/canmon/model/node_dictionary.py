@@ -36,15 +36,15 @@ class Origin(StrEnum):
 
 
 class ObjectRow(NamedTuple):
-    """An object and its latest value.
+    """A row of the object table of a node: one object dictionary entry with its latest value.
 
     Attributes:
         entry: index and sub-index of the object.
         text: name, type and unit of the object.
-        value: value for display, empty if unknown.
-        origin: source in which the value was seen.
-        at_us: time of the value, or None for a value of the EDS.
-        trouble: reason why the latest transfer failed, empty if it did not fail.
+        value: latest value for display, empty if unknown.
+        origin: source of the value, such as a transfer, a PDO or the EDS.
+        at_us: time at which the value was seen, or None for a value of the EDS.
+        trouble: reason why the latest SDO transfer failed, empty if it did not fail.
     """
 
     entry: tuple[int, int]
@@ -60,7 +60,9 @@ class ObjectRow(NamedTuple):
         return "" if self.text.kind is None else self.text.kind.name
 
     def matches(self, wanted: str) -> bool:
-        """Return whether a text is part of the object's name, or the beginning of its index.
+        """Return whether the object matches a search text.
+
+        The text must be a part of the object's name, or the beginning of its index.
 
         >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
         >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
@@ -85,10 +87,10 @@ class _Observed(NamedTuple):
 
 
 class NodeDictionary:
-    """The values of the objects of one node.
+    """The latest known values of the objects of one node, collected from its SDO and PDO traffic.
 
     Args:
-        memory: knowledge from the EDS and from SDO traffic.
+        memory: objects that are known from the EDS of the node and from its SDO traffic.
     """
 
     def __init__(self, memory: NodeMemory) -> None:
@@ -105,7 +107,10 @@ class NodeDictionary:
             self._pdos[decoded.kind] = at_us, decoded
 
     def rows(self, wanted: str = "") -> list[ObjectRow]:
-        """Return the objects that match a text, by index. An empty text matches all objects."""
+        """Return the rows of the objects that match a search text, ordered by index.
+
+        An empty text matches all objects.
+        """
         seen = self._latest()
         entries = sorted({*self.memory.eds.texts, *seen, *self._troubles})
         objects = (entry for entry in entries if entry[0] >= _FIRST_OBJECT)
@@ -166,12 +171,14 @@ _BESIDE_NAME: Final = 60
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
-    """Return lines of text: a header, and a line for each object. An error replaces the type.
+    """Return the object table of a node as lines of text: a header, and a line for each object.
+
+    If the latest transfer of an object failed, the error is shown in place of the type.
 
     Args:
         rows: objects to show.
-        now_us: time to which ages refer.
-        width: columns of the screen, which limit the length of names, or 0 for no limit.
+        now_us: present time, from which ages are counted.
+        width: width of the screen in columns, which limits the length of names, or 0 for no limit.
     """
     longest = max((len(row.text.name) for row in rows), default=0)
     most = max(_SHORT_NAME, width - _BESIDE_NAME) if width else _MOST_NAME
@@ -210,14 +217,17 @@ _TRUTH: Final = {"true": 1, "false": 0}
 
 
 def encode_value(text: ObjectText, words: str) -> bytes:
-    """Return the bytes of a value that is written as in the table, in the unit of the object.
+    """Encode a value that the user typed to the bytes of an SDO download.
+
+    The value is written as in the object table, in the unit of the object.
 
     Args:
-        text: known description of the object. Without a known type, the value is written as bytes.
-        words: value as text. Bytes are in hex.
+        text: known name, type and unit of the object. If the type is unknown, the value must be
+            bytes in hex.
+        words: typed value. Bytes are in hex.
 
     Raises:
-        ValueError: the text is not a value of this object.
+        ValueError: the text is not a valid value for this object.
     """
     kind = text.kind
     if kind in _TEXTS:

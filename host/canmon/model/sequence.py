@@ -57,11 +57,11 @@ _LONGEST: Final = 1_000
 
 
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
-    """Replace each field of a text by its number.
+    """Replace the fields of a sequence step, such as `{id}` or `{id:3}`, by numbers.
 
-    A text with a `#` is a frame, in which a field becomes two hex digits. In other texts, a field
-    becomes a decimal number. `:3` in a field means three hex digits, `:i16` two bytes with the low
-    byte first, `:d` a decimal number.
+    In a text with a `#`, which is a frame, a field becomes two hex digits. In any other text, a
+    field becomes a decimal number. A format after a colon changes this: `:3` means three hex
+    digits, `:i16` two bytes with the low byte first, and `:d` a decimal number.
 
     Raises:
         ValueError: a variable is unknown, a value is not a whole number, or a number does not fit.
@@ -82,10 +82,10 @@ def parse_variable(text: str) -> tuple[str, int]:
 
 
 def evaluate(text: str, variables: Mapping[str, int]) -> int:
-    """Return the result of an expression with whole numbers and variables.
+    """Calculate an integer expression of a sequence file, such as `0x600+id`.
 
     Raises:
-        ValueError: the text is another expression, or the result has more than 64 bits.
+        ValueError: the text is not such an expression, or the result has more than 64 bits.
     """
     try:
         if len(text) > _LONGEST:
@@ -178,10 +178,13 @@ FrameCondition = Condition[Record]
 
 
 def parse_pattern(text: str) -> FrameCondition:
-    """Read a frame in candump notation, with `?` for any hex digit and `*` for any more bytes.
+    """Parse the pattern of an expected frame. Return a condition that tests received frames.
+
+    The pattern is a frame in candump notation, in which `?` is any hex digit and `*` is any number
+    of further bytes.
 
     Raises:
-        ValueError: the text is not such a frame.
+        ValueError: the text is not such a pattern.
     """
     match = _NOTATION.fullmatch(text.strip())
     if match is None:
@@ -205,9 +208,10 @@ class DecodedCondition:
         self._latest = record, decoded
 
     def condition(self, text: str) -> FrameCondition:
-        """Return the condition of a filter expression.
+        """Parse a filter expression. Return a condition that tests decoded frames.
 
-        Raise ValueError if the text is not a filter.
+        Raises:
+            ValueError: the text is not a filter.
         """
         chosen = parse_filter(text)
 
@@ -224,11 +228,11 @@ _FrameStep = Step[Frames, Record]
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """A sequence: its steps, and a function that returns their location in the file.
+    """A parsed sequence: the steps that `canmon seq` runs, such as frames to send or to expect.
 
     Attributes:
         steps: steps in order.
-        locate: function that returns `FILE:LINE` of a place in the sequence.
+        locate: function that returns the position of a step in the file as `FILE:LINE`.
     """
 
     steps: tuple[_FrameStep, ...]
@@ -262,7 +266,7 @@ _Play = Generator[_Pause, bool, bool]
 
 
 class SequenceRun:
-    """The execution of a sequence as time passes.
+    """One execution of a sequence. The caller calls `tick`, which returns the frames to send.
 
     A wait counts from the time at which the previous step was due, so that waits do not drift. In
     each call, frames are processed before time-outs.
@@ -272,9 +276,10 @@ class SequenceRun:
 
     Attributes:
         done: whether the sequence has ended.
-        met: number of expectations that were met.
-        missed: number of expectations that were missed.
-        events: events of the execution. Code that displays the events may remove them.
+        met: number of expected frames that arrived in time.
+        missed: number of expected frames that did not arrive in time.
+        events: events of the execution, such as sent frames. Code that displays the events may
+            remove them.
     """
 
     def __init__(self, sequence: Sequence) -> None:
@@ -293,11 +298,11 @@ class SequenceRun:
         return self._pause.until_us
 
     def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
-        """Process received frames, do the work that is due, and return the frames to send.
+        """Process received frames, execute the steps that are due, and return the frames to send.
 
         Args:
-            now_us: current time. The first call begins the sequence.
-            records: frames since the last call. Frames that this program sent are ignored.
+            now_us: current time. The first call starts the sequence.
+            records: frames since the previous call. Frames that this program sent are ignored.
         """
         if not self._begun:
             self._begun, self._at_us = True, now_us
@@ -412,13 +417,13 @@ _FRAME: Final = re.compile(r"\+([0-9]{1,9}(?:\.[0-9]{1,3})?)\s+(\S+)")
 
 
 def parse_lines(text: str, file: str) -> Sequence:
-    """Parse a sequence that is written as lines.
+    """Parse a sequence in its line format, in which each line is a delay and a frame.
 
     `+10 123#DEADBEEF` sends a frame 10 ms after the line above. `loop 3` as the first line runs all
-    lines three times, `loop forever` until the sequence is stopped. `#` begins a comment.
+    lines three times, and `loop forever` until the sequence is stopped. `#` begins a comment.
 
     Raises:
-        StepError: a line is invalid. The message is `FILE:LINE: what came, what is allowed`.
+        StepError: a line is invalid. The message begins with the position, `FILE:LINE`.
     """
     steps: list[_FrameStep] = []
     times = 1
@@ -469,16 +474,16 @@ class _Wrong(Exception):  # noqa: N818 - never leaves this file
 
 
 class TomlSequence:
-    """Parser of a sequence in a TOML file.
+    """Parser of a sequence in a TOML file, whose steps send, wait, expect and repeat.
 
     Args:
         text: content of the file.
         file: name of the file for messages.
-        variables: values that override those of `[vars]`.
-        resolve: function that makes a frame from the text of a step, if it is not a frame in
-            candump notation.
-        condition: function that makes a condition from an expected text, if it is not a pattern of
-            a frame.
+        variables: values by name, which override those of the table `[vars]` in the file.
+        resolve: function that makes a frame from the text of a step that is not in candump
+            notation.
+        condition: function that makes a condition from an expected text that is not a pattern of a
+            frame.
     """
 
     def __init__(
@@ -497,10 +502,10 @@ class TomlSequence:
         self._variables: dict[str, int] = {}
 
     def parse(self) -> Sequence:
-        """Read the file.
+        """Parse the file, and return the sequence.
 
         Raises:
-            StepError: the file is invalid. The message is `FILE:LINE: what came, what is allowed`.
+            StepError: the file is invalid. The message begins with the position, `FILE:LINE`.
         """
         top = self._document.values
         for line, reason in self._document.mistakes:

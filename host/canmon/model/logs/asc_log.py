@@ -96,7 +96,11 @@ class _AscLines:
         self._now_us = 0
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame, a text for other valid content, or None for an invalid line."""
+        """Parse one line of an ASC log.
+
+        The result is a frame, a text for a valid line that holds no frame, or None for an invalid
+        line.
+        """
         timed = _TIMED.fullmatch(line)
         if timed is None:
             text = line.strip()

@@ -46,7 +46,10 @@ from tickrig.wire.errors import WireError
 
 
 def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | None:
-    """Return the message as a frame. For an impossible frame or time, count it and return None."""
+    """Convert a message of python-can to a record.
+
+    An impossible frame or time is counted in `tally`, and the result is then None.
+    """
     try:
         at_us = log_file.to_us(message.timestamp)
     except ValueError:
@@ -164,7 +167,10 @@ class CanLogReader:
 
 
 def channel_name(channel: object) -> str:
-    """Return the name of a bus with a length that logs can hold. Some formats have only numbers."""
+    """Return the name of a bus for the channel of a log, shortened to a length that logs can hold.
+
+    Some formats have only numbers. The channel 0 is then named `can0`.
+    """
     name = "_".join(str(channel).split())
     if channel is None or not name:
         return UNNAMED
@@ -172,13 +178,13 @@ def channel_name(channel: object) -> str:
 
 
 class BlfBlock(NamedTuple):
-    """The content of a container.
+    """The content of one container, the compressed unit of a BLF log.
 
     Attributes:
-        rows: frames of the container, in the form that its parser returns.
+        rows: frames of the container, in the form that the parser of the container returns.
         frames: number of frames.
-        notes: offset, size and type of the objects that report errors.
-        end: end of the last complete object.
+        notes: offset, size and type of each object that reports an error.
+        end: offset after the last complete object.
     """
 
     rows: Any
@@ -397,9 +403,9 @@ class _AscWriter:
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
 
     def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
-        """Write many frames at once. Return False if that is not possible.
+        """Write many frames at once, which takes 0.4 us for each frame. A single frame takes 6 us.
 
-        A frame takes 0.4 us. A frame that is written alone takes 6 us.
+        The result is False if the format does not allow this for the block.
 
         The caller must write these items one by one: error frames, a frame that begins another
         block, and times that are not exact as floating-point numbers.
@@ -538,9 +544,9 @@ class _BlfWriter(can.BLFWriter):
         self.log_event(mark.text, max(at_s, self._begin(at_s)))
 
     def flush(self) -> None:
-        """End a container, so that its content is readable even if the end of the log is missing.
+        """Complete a container, so that it can be read even if the end of the log is missing.
 
-        python-can's own writer stores the start time of the log only at the end.
+        The writer of python-can stores the start time of the log only at the end.
         """
         self._flush()
         if not self._dated and self.start_timestamp is not None:
@@ -570,10 +576,10 @@ _MARKS: Final = "marks of gaps and triggers"
 
 
 class CanLogWriter:
-    """Writer of a log in a format that python-can supports.
+    """Writer of a log in one of the formats that python-can writes, such as ASC or BLF.
 
-    The formats number their buses. `can3` is number 3. Buses with other names get free numbers,
-    which `words` lists.
+    These formats have numbers in place of bus names. The bus `can3` gets the number 3. A bus with
+    another name gets a free number, and `words` lists these numbers.
 
     Raises:
         LogError: python-can cannot write the format on this machine.
@@ -604,7 +610,11 @@ class CanLogWriter:
         self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
 
     def write_block(self, block: TextBlock, /) -> bool:
-        """Add many frames at once. Return False if they must be added one by one."""
+        """Write many frames at once.
+
+        The result is False if the format cannot do this, so that the caller must write the frames
+        one by one.
+        """
         writer = self._writer
         return isinstance(writer, _AscWriter) and writer.write_block(block, self._numbers.number)
 
@@ -616,7 +626,10 @@ class CanLogWriter:
             self._writer.mark(mark)
 
     def flush(self) -> None:
-        """Pass all items to the operating system. The end of some formats is still missing."""
+        """Pass all written items to the operating system.
+
+        Some formats lack their final part until `close`.
+        """
         if isinstance(self._writer, _BlfWriter):  # MF4 is written as a whole at its end
             self._writer.flush()
         self._file.flush()

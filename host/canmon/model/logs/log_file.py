@@ -54,11 +54,11 @@ class Mark(NamedTuple):
 
     Attributes:
         at_us: time of the event, or time on the clock of this machine if no frame gives the time.
-        event: kind of the event, one of the constants above.
+        event: kind of the event, one of the constants of this module such as `GONE`.
         text: one line of text for display, in ASCII.
-        channel: bus of the event, empty for all buses.
+        channel: bus of the event, or empty if the event concerns all buses.
         frames: number of lost frames.
-        away_us: time for which the bus was away.
+        away_us: time in microseconds during which the bus was away.
     """
 
     at_us: int
@@ -85,7 +85,13 @@ def dropped(at_us: int, frames: int) -> Mark:
 
 
 def gone(at_us: int, channel: str, why: str) -> Mark:
-    """Return a mark for a bus that went away. `why` may begin with the name of the bus."""
+    """Return the mark for a bus that went away.
+
+    Args:
+        at_us: time of the event.
+        channel: name of the bus.
+        why: reason, which may begin with the name of the bus.
+    """
     reason = _plain(why.removeprefix(f"{channel}: "))
     return Mark(at_us, GONE, f"{_plain(channel)} is gone: {reason}", channel)
 
@@ -102,7 +108,7 @@ def triggered(at_us: int, why: str) -> Mark:
 
 
 def read_mark(at_us: int, text: str) -> Mark | None:
-    """Return the mark that a text of a log describes, or None for other texts.
+    """Parse the comment of a log that a mark was written as. Return None for any other comment.
 
     >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
     True
@@ -286,11 +292,11 @@ class LogFormatError(ValueError):
 
 
 class LogError(ValueError):
-    """The file is not a log, or is truncated, or its format cannot be written on this machine."""
+    """A log file is truncated or not of its format, or this machine cannot write the format."""
 
 
 def log_format(path: Path) -> LogFormat:
-    """Return the format of a file.
+    """Return the log format that the name of a file indicates, such as ASC for `run.asc.gz`.
 
     Raises:
         LogFormatError: the name of the file indicates no format.
@@ -359,13 +365,12 @@ def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
 
 
 def read_blocks(file: BinaryIO, path: Path, block_bytes: int) -> Iterator[bytes]:
-    """Read an open text log in pieces of about `size` bytes.
+    """Read an open text log, compressed or not, and yield its bytes in pieces.
 
-    For a truncated or damaged compressed file, everything readable is returned.
+    If a compressed file is truncated or damaged, the readable part is yielded first.
 
     Raises:
-        LogError: the file is truncated or damaged, raised after the readable part. The message
-            contains the place.
+        LogError: the file is truncated or damaged. The message contains the position in the file.
         OSError: the file cannot be read.
     """
     pieces, held, lines = list[bytes](), 0, 0

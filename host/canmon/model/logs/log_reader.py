@@ -92,14 +92,14 @@ _WRAP_US: Final = 1 << 32
 
 
 class ScreenClock:
-    """Clock that computes the time of a frame from the time stamp at the start of its line.
+    """Clock that converts the time stamps of candump's screen output to times in microseconds.
 
     Args:
-        deltas: whether spans count from the previous frame (`-t d`), or from the first
-            one (`-t z`).
+        deltas: whether each time stamp counts from the previous frame (`candump -t d`). Otherwise,
+            it counts from the first frame (`-t z`).
 
     Attributes:
-        shift_us: offset added to a counter of microseconds, so that no time is below 0.
+        shift_us: offset added to an adapter's counter of microseconds, so that no time is below 0.
     """
 
     def __init__(self, deltas: bool = False) -> None:
@@ -109,9 +109,9 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return the clock that fits the time stamps of a text.
+        """Return a clock for a text of candump lines, after a look at the time stamps in it.
 
-        The stamps count from the previous frame if they often decrease, or decrease by much.
+        If the stamps often decrease, or decrease by much, they count from the previous frame.
         """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
@@ -119,7 +119,9 @@ class ScreenClock:
         return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > _LATE_US)
 
     def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
-        """Return the time of a stamp, or the time of the previous frame without a stamp.
+        """Return the time in microseconds that the stamp of a line gives.
+
+        A line without a stamp has the time of the previous frame.
 
         Raises:
             ValueError: the date does not exist.
@@ -136,10 +138,10 @@ class ScreenClock:
         return self._now_us
 
     def counted_us(self, count: int) -> int:
-        """Return the time for a counter of microseconds of an adapter.
+        """Return the time in microseconds for a time stamp that is a counter of a CAN adapter.
 
-        Times begin at 0 if the counter begins below 0. After an overflow of a 32-bit counter,
-        signed or unsigned, times continue to increase.
+        If the counter begins below 0, the times begin at 0. When a 32-bit counter overflows, signed
+        or unsigned, the times continue to increase.
         """
         before = self._count
         if before is None:
@@ -241,7 +243,10 @@ LONGEST: Final = 1 << 20
 
 
 class WholeLines:
-    """Buffer that joins received bytes to lines, at a cost that does not grow with the pieces."""
+    """Buffer that joins received pieces of bytes to whole lines.
+
+    The cost for each byte does not grow with the number of pieces in a line.
+    """
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -343,20 +348,24 @@ def is_usual(line: str) -> bool:
 
 
 def holds_frame(line: str) -> bool:
-    """Return whether a line has the form of `candump -L`, and no CAN FD frame or mark."""
+    """Return whether a line is a classic CAN frame as `candump -L` writes it.
+
+    A CAN FD frame and a mark are not.
+    """
     return "##" not in line and _LINE.fullmatch(line.strip()) is not None
 
 
 class LogLines:
-    """Decoder of a text log: `push` received bytes, and call `finish` at the end.
+    """Parser of a text log that arrives in pieces, such as a candump, JSONL or CSV log.
 
-    A line with bytes outside ASCII is invalid. Such bytes never raise an exception.
+    The caller calls `push` with received bytes, and `finish` at the end. A line with bytes outside
+    ASCII is invalid and never raises an exception.
 
     Attributes:
-        tally: counts of items that are not frames.
-        marks: marks among the frames that were returned last, each with the number of these frames
-            before it.
-        number: number of lines read.
+        tally: counts of lines that are not frames.
+        marks: marks among the frames that the last call returned, each with the number of these
+            frames before the mark.
+        number: number of lines read so far.
     """
 
     def __init__(self) -> None:
@@ -366,7 +375,10 @@ class LogLines:
 
     @property
     def deltas(self) -> bool:
-        """Whether time stamps count from frame to frame, so that a time needs all earlier lines."""
+        """Whether each time stamp counts from the previous frame.
+
+        A time then depends on all earlier lines.
+        """
         return self._clock is not None and self._clock.deltas
 
     def push(self, data: bytes, /) -> list[Record]:
@@ -375,12 +387,14 @@ class LogLines:
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
-        """Skip lines that were read as columns. `holds_frame` is true for each of them.
+        """Count lines that a faster parser has read, so that this parser can continue after them.
+
+        `holds_frame` is true for each of these lines.
 
         Args:
             lines: number of lines.
-            latest_us: time of the last frame in the lines, or None if there was no frame.
-            unusual: whether one of the lines was not usual according to `is_usual`.
+            latest_us: time of the last frame in the lines, or None if they hold no frame.
+            unusual: whether `is_usual` is false for one of the lines.
         """
         self.number += lines
         if unusual:
@@ -478,14 +492,14 @@ BLOCK_BYTES: Final = 1 << 13
 
 
 class LogReader(Protocol):
-    """An iterable of frames that reads during the iteration, from the beginning each time.
+    """The frames of a log file as an iterable. Each iteration reads the file from the beginning.
 
     Attributes:
         tally: counts of items that are not frames.
 
     Raises:
-        OSError: during iteration: the file cannot be read.
-        LogError: during iteration: the content does not match the name of the file.
+        OSError: the file cannot be read. The iteration raises it.
+        LogError: the content does not match the name of the file. The iteration raises it.
     """
 
     tally: LogTally
@@ -497,7 +511,9 @@ class LogReader(Protocol):
 
 
 def read_log(path: Path) -> LogReader:
-    """Return a reader of a log file. The file is not opened yet.
+    """Return a reader for the format of a log file.
+
+    The reader opens the file only when it is iterated.
 
     Raises:
         LogFormatError: the name of the file indicates no format.
@@ -540,21 +556,24 @@ class _LineParser(Protocol):
     """Reader of the lines of one log, in their order."""
 
     def read(self, line: str, tally: LogTally, /) -> Record | str | None:
-        """Return a frame, another item of the line, or None for an invalid line.
+        """Parse one line of a log.
+
+        The result is a frame, a text for a valid line that holds no frame, or None for an invalid
+        line.
 
         Raises:
             LogError: the file is not a log of this format.
-            WireError: the line has a frame that CAN cannot have.
+            WireError: the line has a frame that cannot occur on a CAN bus.
             ValueError, LookupError: the line is invalid.
         """
 
 
 class LineLogReader:
-    """A reader of a log whose header defines the format of its lines.
+    """Base class of readers for text logs whose header defines how their lines are parsed.
 
     Attributes:
-        comments: beginnings of lines that may be marks.
-        make_lines: function that makes the parser of the lines.
+        comments: prefixes of comment lines that may hold marks.
+        make_lines: function that makes a new parser of lines for each reading.
     """
 
     comments: tuple[str, ...] = ()
@@ -568,7 +587,10 @@ class LineLogReader:
         return (item for item in self.items() if isinstance(item, Record))
 
     def items(self) -> Iterator[Item]:
-        """Read the file with the marks among its frames. A mark has the time of the next frame."""
+        """Read the file, and yield its frames and marks in order.
+
+        A mark gets the time of the next frame.
+        """
         tally = self.tally = LogTally()
         lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=_MOST_MARKS), 0
         for number, line in enumerate(self._lines(), 1):
@@ -611,7 +633,9 @@ _NUMBERLESS: Final = "canX"
 
 
 def bus_name(number: str) -> str:
-    """Return the name of a bus by its number from 1. Raise ValueError for other texts.
+    """Return the name of a bus for its number in a log, which counts from 1, or `canX` for 0.
+
+    A text that is not a number raises ValueError.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

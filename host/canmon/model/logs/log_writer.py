@@ -28,9 +28,10 @@ class LogWriter(Protocol):
         """Add an item other than a frame, if the format can hold it."""
 
     def flush(self) -> None:
-        """Pass all added items to the operating system. The items are readable if nothing follows.
+        """Pass all written items to the operating system.
 
-        With `in_blocks`, this makes the file larger. Call it rarely.
+        They can then be read even if nothing follows. In a format that is written in blocks
+        (`in_blocks`), each call makes the file larger, so call it rarely.
         """
 
     def close(self) -> None:
@@ -41,14 +42,16 @@ class LogWriter(Protocol):
 
 
 class TextBlock(Protocol):
-    """Many frames that can be written as lines at once. `column_text` implements this protocol.
+    """A block of many frames that a log writer can write as text at once.
+
+    Columns of frames, in `column_text`, implement this protocol.
 
     Attributes:
         first_us: time of the first frame.
         last_us: time of the last frame.
         earliest_us: least time of a frame.
         latest_us: greatest time of a frame.
-        errors: whether there are error frames.
+        errors: whether the block contains error frames.
     """
 
     first_us: int
@@ -79,10 +82,12 @@ def in_blocks(path: Path) -> bool:
 
 
 def write_log(path: Path) -> LogWriter:
-    """Begin a log. An existing file is replaced.
+    """Create a log file, and return the writer for the format that its name indicates.
+
+    An existing file is replaced.
 
     Raises:
-        LogFormatError: the name of the file has no known format.
+        LogFormatError: the name of the file indicates no format.
         OSError: the file cannot be written.
         LogError: the format needs a library that is not installed.
     """
@@ -92,7 +97,10 @@ def write_log(path: Path) -> LogWriter:
 
 
 def log_line(record: Record) -> str:
-    """Return a frame as `candump -L` writes it. A sent frame ends in T, as with `candump -L -x`."""
+    """Return the line that `candump -L` writes for a frame.
+
+    The line of a sent frame ends in T, as with `candump -L -x`.
+    """
     at_us, channel, frame, sent = record
     end = " T" if sent else ""
     return f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d}) {channel} {frame}{end}"
@@ -127,7 +135,11 @@ class TextLogWriter:
             self._give()
 
     def write_block(self, block: TextBlock, /) -> bool:
-        """Add many frames at once. Return False if they must be added one by one."""
+        """Write many frames at once.
+
+        The result is False if the format cannot do this, so that the caller must write the frames
+        one by one.
+        """
         if self._kind is not log_file.LogFormat.CANDUMP:
             return False
         self._give()
@@ -162,7 +174,7 @@ class TextLogWriter:
 
 
 class CsvLogWriter(TextLogWriter):
-    """Writer of a CSV log, with rows below a header. The rows do not name their bus."""
+    """Writer of a CSV log: a header, and a row for each frame. The rows do not name the bus."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
@@ -191,7 +203,10 @@ _NUMBERED: Final = re.compile(r"can([0-9]{1,3})")
 
 
 class BusNumbers:
-    """Numbers of buses, for a log without names. `can3` is number 3, others get free numbers."""
+    """Numbers of buses for log formats that store no names.
+
+    `can3` is 3, other names get free numbers.
+    """
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
@@ -220,7 +235,10 @@ _GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,
 
 
 class GvretLogWriter(TextLogWriter):
-    """Writer of rows for SavvyCAN, with data frames of at most 8 bytes, and numbers of buses."""
+    """Writer of a GVRET log, the CSV format of SavvyCAN.
+
+    The format holds only data frames with at most 8 bytes, and has numbers in place of bus names.
+    """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)

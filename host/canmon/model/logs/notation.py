@@ -23,10 +23,13 @@ _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 
 
 def parse_frame(notation: str) -> AnyFrame:
-    """Parse a frame. Raise WireError if it is invalid.
+    """Parse a frame in candump notation, such as `123#DEADBEEF`.
 
     The raw length code after eight bytes is ignored. An error frame may have fewer than eight
     bytes.
+
+    Raises:
+        WireError: the text is not a valid frame.
     """
     if error := _ERROR.fullmatch(notation):
         data = bytes.fromhex(error[2]).ljust(8, b"\0")
@@ -45,12 +48,15 @@ _LINE_EVENT: Final = "line"
 
 
 def json_line(record: Record, more: str = "") -> str:
-    """Return a frame as JSON. `more` contains further members, each with a comma before it.
+    """Return a frame as one line of JSON, the format of JSONL logs and of `--jsonl`.
 
     A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
-    (hex). A remote frame has `rtr`, its length. An error frame has `err`: 1, and its class as `id`.
-    A CAN FD frame has `fd`: 1, and `brs`: 1 and `esi`: 1 if these bits are set.
-    `{"v":1,"ev":"drop","n":12}` reports lost frames. A line of a serial port is also an event.
+    (hex). A remote frame has `rtr`, which is its length. An error frame has `err`: 1, and its class
+    as `id`. A CAN FD frame has `fd`: 1, and `brs`: 1 and `esi`: 1 if these bits are set. `more`
+    contains further members, each with a comma before it.
+
+    Other lines are events: `{"v":1,"ev":"drop","n":12}` reports lost frames, and a line of a serial
+    port is also an event.
 
     >>> json_line(Record(1_500_000, "can0", can.CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
@@ -72,7 +78,9 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Return an event as JSON. `more` contains further members, each with a comma before it.
+    """Return a message of a serial line as one line of JSON, which is an event for `json_line`.
+
+    `more` contains further members, each with a comma before it.
 
     >>> from tickrig.host.canmon.model.decode.decoded import Decoded
     >>> line_json(LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc")))
@@ -96,7 +104,10 @@ def drop_line(lost: int) -> str:
 
 
 def parse_json_line(text: str, tally: log_file.LogTally) -> Record | str | None:
-    """Return the frame or the name of the event in a line, or None for anything else."""
+    """Parse one line of a JSON log.
+
+    The result is a frame, the name of an event, or None for an invalid line.
+    """
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
     try:
@@ -179,12 +190,12 @@ _DUMPED: Final = re.compile(
 
 
 def csv_row(record: Record) -> str:
-    """Return a frame as a row below `LOG_HEADER`.
+    """Return a frame as a row of a CSV log, in the format of python-can with additions.
 
-    python-can's format does not contain the sender of a frame. Here, a `>` after the data marks a
-    frame that this program sent. base64 does not use `>`, and python-can ignores it. The format
-    does not contain CAN FD either. Here, a `#` in the same place marks a CAN FD frame, `!` marks
-    BRS, and `*` marks ESI.
+    python-can's format does not contain the direction of a frame. Here, a `>` after the data marks
+    a frame that this program sent. base64 does not use `>`, and python-can ignores it. The format
+    does not contain CAN FD either. Here, a `#` after the data marks a CAN FD frame, `!` marks BRS,
+    and `*` marks ESI.
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent
@@ -227,9 +238,10 @@ def gvret_row(record: Record, bus: int) -> str:
 
 
 def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
-    """Return a frame, a name for a header or a counted item, or None for an invalid row.
+    """Parse a row of a CSV log, which python-can, `canmon dump --csv` or SavvyCAN wrote.
 
-    The row itself shows its format, which is that of python-can, `canmon dump --csv`, or SavvyCAN.
+    The row itself shows which of these formats it has. The result is a frame, a text for a header
+    or another counted item, or None for an invalid row.
     """
     if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
         return text

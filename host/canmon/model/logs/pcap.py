@@ -82,7 +82,10 @@ def _option(code: int, value: bytes) -> bytes:
 
 
 def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield code and value of each complete option. `order` is `<` or `>`, as in `struct`."""
+    """Yield the code and the value of each complete option of a pcapng block.
+
+    `order` is the byte order, `<` or `>` as in `struct`.
+    """
     head, at = struct.Struct(f"{order}HH"), 0
     while at + head.size <= len(data):
         code, size = head.unpack_from(data, at)
@@ -113,7 +116,7 @@ _DATA_AT: Final = 8
 
 
 def packet(frame: AnyFrame) -> bytes:
-    """Return a frame as the data of a packet: 16 bytes, or 72 bytes for CAN FD."""
+    """Return a frame as the data of a SocketCAN packet: 16 bytes, or 72 bytes for CAN FD."""
     if isinstance(frame, can.FdFrame):
         flagged = frame.can_id | EXTENDED * frame.extended
         return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
@@ -209,14 +212,15 @@ class _PcapngReader:
         self._blocks, self._wanted, self._at_us, self._damage = 0, _READ_BYTES, 0, ""
 
     def frames(self, file: BinaryIO, begun: bytes) -> Iterator[Item]:
-        """Yield frames.
+        """Yield the frames and marks of a pcapng capture.
 
         Args:
             file: open file.
-            begun: part of the file that was already read.
+            begun: bytes at the beginning of the file that were already read.
 
         Raises:
-            LogError: the file is truncated or damaged, raised after all frames before that place.
+            LogError: the file is truncated or damaged. It is raised after all frames before the
+                damage.
         """
         more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
         while more:
@@ -498,10 +502,11 @@ _BLOCK_FRAMES: Final = 256
 
 
 class PcapngWriter:
-    """Writer of a pcapng capture. Wireshark shows a mark as a comment of the frame after it.
+    """Writer of a pcapng capture for Wireshark. A mark becomes a comment of the frame after it.
 
     Raises:
-        LogError: the file is pcap, the predecessor of pcapng, which does not name its buses.
+        LogError: the name of the file ends in `.pcap`. That older format does not name its buses,
+            so it is not written.
         OSError: the file cannot be written.
     """
 
@@ -550,7 +555,10 @@ class PcapngWriter:
         self._file.flush()
 
     def close(self) -> None:
-        """End the capture. Marks after the last frame go into statistics of the first bus."""
+        """Complete the capture.
+
+        Marks after the last frame are stored in the statistics of the first bus.
+        """
         if self._file.closed:
             return
         with self._file:

@@ -28,9 +28,10 @@ _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
 class TraceLogWriter:
-    """Writer of a trace of one bus, as a host sees it.
+    """Writer of a trace file of the test bench, with the frames of one bus as the host sees them.
 
-    The first frame defines the bus and the origin of times.
+    The first frame determines the bus, and times count from it. Frames of other buses are counted,
+    but not written.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -39,7 +40,10 @@ class TraceLogWriter:
         self._left_out: Counter[str] = Counter()
 
     def write(self, record: Record, /) -> None:
-        """Add a frame. A late frame gets at least the time of the last frame."""
+        """Write a frame.
+
+        If its time is before that of the previous frame, it gets that frame's time.
+        """
         if not self._channel:
             self._begin(record)
         if record.channel != self._channel or not isinstance(record.frame, CanFrame):
@@ -92,11 +96,11 @@ def _name(channel: str) -> str:
 
 
 class TraceLogReader:
-    """A reader of the frames in a trace.
+    """Reader of the CAN frames in a trace file of the test bench.
 
-    For a trace that was recorded at the devices, the reader returns the frames in the order in
-    which they were sent or first received. A frame of the host that several nodes received is
-    returned once.
+    If the trace was recorded at the devices, the reader returns the frames in the order in which
+    they were sent or first received. A frame of the host that several nodes received is returned
+    once.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

@@ -77,7 +77,10 @@ class _Row(NamedTuple):
     data: list[str]
 
     def hex_bytes(self) -> bytes:
-        """Return the data up to the first word that is not a byte, such as `--` or `BUSHEAVY`."""
+        """Return the data bytes of the row.
+
+        They end at the first word that is not a byte, such as `BUSHEAVY`.
+        """
         return bytes.fromhex("".join(takewhile(_BYTE.fullmatch, self.data)))
 
 
@@ -89,10 +92,13 @@ class _TrcLines:
         self._columns: Sequence[str] = _VERSIONS["1.0"]
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame, another item of the line, or None for an invalid line.
+        """Parse one line of a TRC log.
+
+        The result is a frame, a text for a valid line that holds no frame, or None for an invalid
+        line.
 
         Raises:
-            LogError: the columns are unknown.
+            LogError: the header names columns that are unknown.
         """
         text = line.strip()
         if not text or text.startswith(";"):

@@ -67,7 +67,7 @@ class AtLimit(StrEnum):
 
 
 class TriggerSpan(NamedTuple):
-    """The span before or after a trigger, either a number of frames or a time.
+    """Amount of traffic to record before or after a trigger: either a number of frames or a time.
 
     The attribute that does not apply is None.
     """
@@ -81,15 +81,17 @@ DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingPlan:
-    """The settings of a recording. Without any setting, the recording is the single file `path`.
+    """Settings of a recording: its files, their limits, and the trigger.
+
+    By default, it is one file.
 
     Attributes:
-        path: path of the file, or base name of its parts.
-        rotate_bytes: size that a part may not exceed, or None for no limit.
-        rotate_us: duration of a part. The part ends at the first frame that is at least this much
-            later than its first frame.
-        disk_bytes: limit of the total size of all parts.
-        at_limit: action at the limit of disk space.
+        path: path of the file. If the recording has parts, their names are derived from this path.
+        rotate_bytes: maximum size of a part in bytes, or None for no limit.
+        rotate_us: duration of a part in microseconds, or None for no limit. The part ends at the
+            first frame that is at least this much later than its first frame.
+        disk_bytes: maximum total size of all parts in bytes, or None for no limit.
+        at_limit: action when the total size is reached.
         around: spans of traffic to record before and after a trigger, or None to record everything.
         parts: whether to record in parts, even if no setting requires it.
     """
@@ -118,7 +120,7 @@ class RecordingPlan:
         return self.path.with_name(f"{self._stem}-{number:05d}{self._ending}")
 
     def number(self, name: str) -> int:
-        """Return the number of a part, or 0 if the path is not a part."""
+        """Return the number of the part with this file name, or 0 if the file is not a part."""
         pattern = rf"{re.escape(self._stem)}-([0-9]{{5,9}}){re.escape(self._ending)}"
         match = re.fullmatch(pattern, name)
         return int(match[1]) if match else 0
@@ -143,15 +145,16 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     waits: bool = False,
     parts: bool = False,
 ) -> RecordingPlan:
-    """Parse the arguments of a recording.
+    """Parse the options of a recording on the command line, and return its settings.
 
     Args:
         path: path of the file. Parts are named after it.
         rotate: limits of a part, at most one size and one time.
         disk: limit of the total size of all parts.
-        at_limit: action at the limit, `oldest` or `end`.
-        pre: span to record before a trigger.
-        post: span to record after a trigger.
+        at_limit: action at the limit of the total size. `oldest` removes the oldest part, `end`
+            ends the recording.
+        pre: amount of traffic to record before a trigger, as frames or time.
+        post: amount of traffic to record after a trigger, as frames or time.
         waits: whether the recording waits for a trigger, even without `pre` and `post`.
         parts: whether to record in parts, even if nothing else requires it.
 
@@ -297,7 +300,7 @@ class _RecordingPart:
         self.last_us, self._pending = records[-1].at_us, True
 
     def write_block(self, block: TextBlock) -> bool:
-        """Add many frames at once. Return False if the format needs them one by one."""
+        """Write many frames at once. Return False if the format needs them one by one."""
         if self._write_block is None or not self._write_block(block):
             return False
         self.frames += len(block)
@@ -313,7 +316,10 @@ class _RecordingPart:
         self._pending = True
 
     def flush(self, now_us: int) -> None:
-        """Pass the written data to the operating system, once a second for a compressed log."""
+        """Pass the written data to the operating system.
+
+        A compressed log does so only once a second.
+        """
         if not self._pending:
             return
         if self._in_blocks:
@@ -332,7 +338,10 @@ class _RecordingPart:
         return self._writer.messages()
 
     def rescue(self) -> None:
-        """End the log after an error. Complete items stay. An incomplete last item is removed."""
+        """Close the log after a write error.
+
+        Complete items stay, and an incomplete last item is removed.
+        """
         with suppress(OSError, ValueError):
             self._writer.close()
         with suppress(OSError):
@@ -418,7 +427,10 @@ class _Index:
         self._put(json.dumps(said, separators=(",", ":")))
 
     def mark(self, mark: log_file.Mark, file: str) -> None:
-        """Add a mark to the index, with the name of its file, or an empty name for no file."""
+        """Add a mark to the index.
+
+        `file` is the name of the file that contains the mark, or empty if no file does.
+        """
         text = mark.json()
         self._put(f'{text[:-1]},"file":{json.dumps(file)}}}' if file else text)
 
@@ -468,23 +480,24 @@ _LOOK_FRAMES: Final = 512
 
 
 class Files:
-    """Writer of frames and marks into one file, or into parts that the index lists.
+    """Writer of a recording into one file, or into parts that an index file lists.
 
-    A recording with an existing index is continued. Its parts stay, and count for the limits.
+    If an index exists already, its recording is continued. Its parts stay, and count for the
+    limits.
 
     Args:
         plan: settings of the recording.
-        now_us: current time.
+        now_us: present time in microseconds.
 
     Attributes:
-        frames: number of frames to be written.
-        parts: number of started files.
-        removed: number of removed files.
+        frames: number of frames that were stored.
+        parts: number of files that were begun.
+        removed: number of files that were removed to stay within the limits.
         ended: reason why writing ended, empty if writing continues.
 
     Raises:
-        OSError: a file cannot be written, now or later.
-        LogError: the format cannot be written here, now or later.
+        OSError: a file cannot be written. Methods raise it, too.
+        LogError: the format cannot be written on this machine. Methods raise it, too.
     """
 
     def __init__(self, plan: RecordingPlan, now_us: int) -> None:
@@ -530,7 +543,7 @@ class Files:
             self._keep_limit()
 
     def store_block(self, block: TextBlock) -> bool:
-        """Add many frames at once. Return False if they must be stored one by one."""
+        """Store many frames at once. Return False if the caller must store them one by one."""
         part = self._part
         if self._index is not None or part is None or not part.write_block(block):
             return False
@@ -546,7 +559,7 @@ class Files:
             self._index.mark(mark, "" if self._part is None else self._part.path.name)
 
     def mark_again(self, mark: log_file.Mark) -> None:
-        """Add a mark to the current file only, because the index already has the mark."""
+        """Write a mark to the current file, but not to the index, which has the mark already."""
         if self._part is not None:
             self._part.mark(mark)
 
@@ -567,7 +580,11 @@ class Files:
             self._index.write(_FILE, self._latest_us, file=part.path.name, **part.summary())
 
     def rescue(self, why: str) -> None:
-        """End the recording after an error, so that the content of files can be read."""
+        """End the recording after an error, and leave files that can be read.
+
+        Args:
+            why: reason for the end.
+        """
         part, self._part = self._part, None
         if part is not None:
             part.rescue()

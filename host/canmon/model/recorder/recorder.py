@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 
 class Trigger(Protocol):
-    """A trigger that examines each frame.
+    """A condition that starts a recording. The recorder calls it with each frame.
 
     Attributes:
-        name: displayed name of the trigger.
-        decodes: whether the trigger needs decoded frames.
+        name: name of the trigger for display.
+        decodes: whether the trigger needs the decoded meaning of frames.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Trigger(Protocol):
         """Return the reason why a frame is a trigger, or an empty text if it is not."""
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Return the reason why a missing or lost frame is a trigger, or an empty text."""
+        """Return the reason to trigger because of missing or lost frames, or an empty text."""
         return ""
 
     def messages(self) -> list[str]:
@@ -56,7 +56,7 @@ class Trigger(Protocol):
 
 
 class FilterTrigger(Trigger):
-    """Trigger by frames that pass a filter.
+    """Trigger that starts a recording at a frame that passes a filter.
 
     Args:
         name: text of the filter.
@@ -80,11 +80,11 @@ class FilterTrigger(Trigger):
 
 
 class RuleTrigger(Trigger):
-    """Trigger by findings of the rules of a check.
+    """Trigger that starts a recording when a rule of a check is broken.
 
     Args:
-        name: name of the rules, such as the name of their file.
-        alarms: rules with their alarms.
+        name: name of the set of rules, such as the name of their file.
+        alarms: evaluation of the rules, which reports findings.
     """
 
     def __init__(self, name: str, alarms: Alarms) -> None:
@@ -148,13 +148,13 @@ _MAX_MARKS: Final = 1_000
 
 
 class PreTrigger:
-    """Buffer of the latest frames, and of the marks among them.
+    """Buffer that keeps the latest frames and marks, to record the traffic before a trigger.
 
     Args:
-        span: number of frames before the latest frame, or a time.
+        span: amount of traffic to keep, as a number of frames or a time.
 
     Attributes:
-        short: whether frames of the span were dropped, because there were too many.
+        short: whether the buffer holds less than the span, because the span had too many frames.
     """
 
     def __init__(self, span: TriggerSpan) -> None:
@@ -310,13 +310,13 @@ class Recorder:
         now_us: int,
         marks: Sequence[Mark] = (),
     ) -> None:
-        """Process frames and marks that have arrived.
+        """Process arrived frames and marks: store them, or search the frames for a trigger.
 
         Args:
-            decoded_frames: frames, each with its meaning if a filter needs decoded frames.
-            lost: total number of lost frames.
+            decoded_frames: frames in order, each with its decoded meaning if a filter needs it.
+            lost: total number of frames lost so far.
             now_us: current time.
-            marks: events after these frames.
+            marks: events that happened after these frames.
         """
         if not self.running:
             self._missing += len(decoded_frames)
@@ -331,10 +331,12 @@ class Recorder:
             self._files.flush(now_us)
 
     def take_block(self, block: TextBlock, now_us: int) -> bool:
-        """Process many frames. Return False if they must be processed one by one.
+        """Record many frames at once.
+
+        Return False if the caller must pass them to `take` one by one.
 
         Args:
-            block: block of at least one frame, with no event after the frames.
+            block: at least one frame, with no event after the frames.
             now_us: current time.
         """
         whole = self._before is None and self._wanted is None
