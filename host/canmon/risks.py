@@ -39,7 +39,10 @@ NMT_WORDS: Final = {
 
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
-    """Return the motion that a write to a node may cause, for a CiA 402 drive or another device."""
+    """Return a warning about motion that a write to objects of a node may cause, empty for none.
+
+    The text depends on the objects, and on whether the node is a CiA 402 drive.
+    """
     indices = [index for index, _ in entries]
     profile = [index for index in indices if index in _DRIVE_AREA]
     told = [name for index in profile if (name := _COMMANDS.get((index - 0x6000) % _AXIS))]
@@ -54,7 +57,7 @@ def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
 
 
 def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
-    """Return the motion that an NMT command may cause at one node.
+    """Return a warning about the motion or output change that an NMT command may cause at a node.
 
     Args:
         command: NMT command.

@@ -38,10 +38,12 @@ _MOST: Final = 200_000
 
 
 class SettingError(ValueError):
-    """An invalid setting.
+    """A setting in a workspace file is invalid.
+
+    The panel or function that reads the setting raises it.
 
     Attributes:
-        path: keys and indices of the setting, below the table of the panel.
+        path: keys and indices that lead to the setting, from the table of the panel.
     """
 
     def __init__(self, path: Sequence[str | int], reason: str) -> None:
@@ -50,19 +52,19 @@ class SettingError(ValueError):
 
 
 class WorkspaceError(ValueError):
-    """A file that cannot be used or written. The message is one line with the name of the file."""
+    """A workspace file cannot be used or written. The message is one line that names the file."""
 
 
 class Workspace:
-    """The settings of a workspace file, by section.
+    """The settings of the monitor in a workspace file, which is a TOML file with named sections.
 
     Args:
-        text: content of the file.
+        text: content of the file as TOML.
         path: path of the file, or None for settings that are not stored.
 
     Raises:
-        WorkspaceError: the text is not TOML (the message names the line), or tomlkit is not
-            installed.
+        WorkspaceError: the text is not TOML, or tomlkit is not installed. The message names the
+            line.
     """
 
     def __init__(self, text: str = "", path: Path | None = None) -> None:
@@ -84,7 +86,7 @@ class Workspace:
 
     @classmethod
     def read(cls, path: Path) -> Workspace:
-        """Read a file. A file that does not exist yet is an empty workspace.
+        """Read a workspace file. If the file does not exist yet, the workspace is empty.
 
         Raises:
             WorkspaceError: the file cannot be read, or is not TOML.
@@ -103,7 +105,7 @@ class Workspace:
         return list(self._document)
 
     def section(self, name: str) -> dict[str, Any]:
-        """Return the settings of a section, empty if the section does not exist.
+        """Return the settings of one section of the file, empty if the section does not exist.
 
         Raises:
             WorkspaceError: the section is not a table.
@@ -121,7 +123,10 @@ class Workspace:
         return WorkspaceError(f"{self.path}, line {place}: {name}")
 
     def put(self, name: str, settings: Mapping[str, Any]) -> None:
-        """Set the settings of a section. A None value removes its key. Other keys stay."""
+        """Change settings of one section, without writing the file.
+
+        The value None removes a key. Keys that `settings` does not contain stay.
+        """
         if settings:
             _merge(self._document, {name: settings})
 
@@ -131,10 +136,10 @@ class Workspace:
         return self._document.as_string()
 
     def write(self, *, over: bool = False) -> bool:
-        """Write the file if anything has changed. Return whether it has changed.
+        """Write the settings to the file if they have changed. Return whether they have changed.
 
         Args:
-            over: whether to overwrite the file regardless of its present content.
+            over: whether to overwrite the file even if another program has changed it.
 
         Raises:
             WorkspaceError: the file cannot be written, or has changed since it was last read or
@@ -219,13 +224,13 @@ _LISTS: Final = ("source", "dbc", "eds_dir", "timing", "bus_kwargs")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MonitorSetup:
-    """Sources and files of the monitor.
+    """Sources and files that the monitor `canmon tui` was started with.
 
     Attributes:
-        source: SOURCE words.
+        source: SOURCE words that name the source.
         options: options of the buses.
-        eds: EDS files by node-ID.
-        dbc: DBC files.
+        eds: paths of EDS files by node-ID.
+        dbc: paths of DBC files.
         eds_dir: folders of EDS files for nodes that are not in `eds`.
     """
 
@@ -237,10 +242,10 @@ class MonitorSetup:
 
     @classmethod
     def read(cls, workspace: Workspace) -> Self:
-        """Read the sources and files of a workspace.
+        """Return the sources and files that a workspace file contains.
 
         Raises:
-            WorkspaceError: a setting is wrong. The message names its line.
+            WorkspaceError: a setting is invalid. The message names its line.
         """
         bus, nodes = workspace.section(_BUS), workspace.section(_NODES)
         folder = _folder(workspace)
@@ -368,12 +373,14 @@ class _Kept(Protocol):
 
 
 class PanelSettings:
-    """Storage that restores and saves the settings of panels.
+    """Storage that connects the panels of the monitor with a workspace file.
+
+    It loads the settings of the panels from the file, and saves them to the file.
 
     Args:
-        workspace: workspace that stores the settings.
-        setup: buses and files in use.
-        panels: panels with these settings.
+        workspace: workspace file with the settings.
+        setup: sources and files in use.
+        panels: panels whose settings are stored.
     """
 
     def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
@@ -401,10 +408,11 @@ class PanelSettings:
         return words
 
     def save(self) -> str:
-        """Write changed settings. Return an error text, but the same error only once.
+        """Write changed settings of the panels to the workspace file.
 
-        If another program has changed the file, the file is not written until the user exports the
-        settings.
+        Return the text of an error, or an empty text. The same error is returned only once. If
+        another program has changed the file, the settings are not written until the user exports
+        them.
         """
         self._put()
         try:
@@ -416,7 +424,7 @@ class PanelSettings:
         return ""
 
     def export(self, path: Path) -> None:
-        """Write all settings to a file, and use this file from now on.
+        """Write all settings of the panels to a file, and use this file from then on.
 
         Raises:
             WorkspaceError: the file cannot be written.
@@ -452,7 +460,17 @@ def text_of(settings: Mapping[str, Any], name: str, default: str) -> str:
 
 
 def choice(settings: Mapping[str, Any], name: str, default: str, known: Sequence[str]) -> str:
-    """Return one of some texts. Raise SettingError if the value is not one of them."""
+    """Return a setting whose value must be one of the texts in `known`.
+
+    Args:
+        settings: settings of a panel.
+        name: key of the setting.
+        default: value if the setting is missing.
+        known: allowed values.
+
+    Raises:
+        SettingError: the value is not allowed.
+    """
     value = settings.get(name, default)
     if value not in known:
         raise SettingError((name,), f"{value!r} is not one of {', '.join(known)}")
@@ -460,7 +478,11 @@ def choice(settings: Mapping[str, Any], name: str, default: str, known: Sequence
 
 
 def tables(settings: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    """Return an array of tables, empty if it is missing. Raise SettingError for other values."""
+    """Return a setting that is a TOML array of tables, or an empty list if it is missing.
+
+    Raises:
+        SettingError: the value is not an array of tables.
+    """
     value = settings.get(name, [])
     if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
         raise SettingError((name,), f"is no array of tables [[{name}]]")
@@ -468,7 +490,11 @@ def tables(settings: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
 
 
 def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """Return a list of texts, empty if it is missing. Raise SettingError for other values."""
+    """Return a setting that is a list of texts, or an empty tuple if it is missing.
+
+    Raises:
+        SettingError: the value is not a list of texts.
+    """
     value = settings.get(name, [])
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
         raise SettingError((name,), f"{value!r} is no list of texts")
@@ -477,9 +503,10 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 
 @contextmanager
 def below(*path: str | int) -> Iterator[None]:
-    """Extend the path of a SettingError in the block by the given path.
+    """Context manager that puts the keys of an outer table in front of the path of a SettingError.
 
-    Any other ValueError becomes a SettingError of the given path.
+    A function that reads a nested table uses it, so that the error names the full path. Any other
+    ValueError in the block becomes a SettingError of this path.
     """
     try:
         yield
@@ -491,11 +518,12 @@ def below(*path: str | int) -> Iterator[None]:
 
 
 def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
-    """Return the bus in settings, empty for the first bus.
+    """Return the bus name in the settings of a sending panel, or an empty text for the first bus.
 
-    Raise SettingError if there is no such bus.
+    A log has no buses, so any name is then valid.
 
-    A log has no buses, and any name is then valid.
+    Raises:
+        SettingError: no open bus has this name.
     """
     bus = text_of(settings, "bus", "")
     if bus and buses and bus not in buses:

@@ -307,7 +307,7 @@ def rate_text(per_s: float) -> str:
 
 
 def load_text(bits_s: int, bit_rate: int | None) -> str:
-    """Return a bus load as text, in percent of the bit rate, or in bits per second if that is None.
+    """Return a bus load as text, in percent of the bit rate, or in bit/s if no bit rate is given.
 
     >>> load_text(123_456, 1_000_000), load_text(123_456, None)
     ('12.3 %', '123.5 kbit/s')

@@ -48,16 +48,19 @@ _MOST_SIGNALS: Final = 400
 
 
 class TimeBins(Generic[_Key]):
-    """Sums of amounts over spans of time of equal width, which doubles if there are too many.
+    """Sums over time: the time axis is divided into spans of equal width, each with sums by key.
+
+    If a later time would need too many spans, the width is doubled and the spans are merged. The
+    memory is therefore limited.
 
     Args:
         most: maximum number of spans.
-        width_us: initial width of a span.
+        width_us: present width of a span in microseconds.
 
     Attributes:
         width_us: present width of a span.
-        sums: sum of each span with values, by key.
-        ranges: least and greatest value of each span with values, by key.
+        sums: sum of the amounts in each span, by key and then by number of the span.
+        ranges: least and greatest value in each span, by key and then by number of the span.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
@@ -66,7 +69,7 @@ class TimeBins(Generic[_Key]):
         self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
-        """Make sure that a time lies in a span. If there are too many spans, merge them."""
+        """Widen the spans, if this is needed for a span that contains the time `at_us`."""
         shift = (at_us // self.width_us // self._most).bit_length()
         if not shift:
             return
@@ -97,11 +100,13 @@ class TimeBins(Generic[_Key]):
 
 
 class Thinned(Generic[_T]):
-    """Items in their order. If there are many items, only every second or every fourth is kept.
+    """A list with limited memory, which keeps a regular sample of the items that are added.
+
+    If there are many items, only every second, then every fourth item is kept.
 
     Attributes:
-        items: items that are kept.
-        count: number of all items.
+        items: items that are kept, in order of addition.
+        count: number of all items that were added.
     """
 
     def __init__(self, most: int = _MOST_MARKS) -> None:
@@ -119,9 +124,9 @@ class Thinned(Generic[_T]):
         self.count += 1
 
     def pass_over(self) -> bool:
-        """Count one more item that would not be kept.
+        """Count an item without creating it, if the list would not keep the item anyway.
 
-        Return False without counting if it would be kept.
+        If the list would keep the item, nothing is counted, and the result is False.
         """
         if self.count % self._step == 0:
             return False
@@ -158,7 +163,7 @@ class _Bands:
 
 
 class SignalName(NamedTuple):
-    """The name of a signal of a node's PDO, or of a message of a DBC file."""
+    """The name of a signal, either in a PDO of a node, or in a message of a DBC file."""
 
     channel: str
     node: int | None
@@ -168,14 +173,17 @@ class SignalName(NamedTuple):
 
 @dataclass(slots=True)
 class SignalTrack:
-    """A signal over time. The values are in the bins.
+    """Summary of the values that one signal had in a recording.
+
+    The values over time are stored elsewhere, in `TimeBins`.
 
     Attributes:
         unit: unit of the values.
-        source: source of the signal's name.
-        count: number of values.
+        source: source of the signal's name, such as an EDS or a DBC file.
+        count: number of values that were received.
         low, high: least and greatest value.
-        states: states of a signal whose values have names, or None for a number.
+        states: states over time, if the values of the signal have names, or None for a numeric
+            signal.
     """
 
     unit: str = ""
@@ -193,12 +201,12 @@ class SignalTrack:
 
 
 class Mark(NamedTuple):
-    """An event of a node, for display on the lane of the node.
+    """An event of a CANopen node that the time chart of the node shows.
 
     Attributes:
-        at_us: time since the first frame.
+        at_us: time since the first frame in microseconds.
         text: description of the event.
-        span_us: duration of the event.
+        span_us: duration of the event in microseconds.
     """
 
     at_us: int
@@ -299,7 +307,10 @@ class Survey(NodeBoard):
         self.bits.add_at(channel, place, bits)
 
     def take(self, record: Record, decoded: Decoded) -> None:
-        """Add the events of a frame to the lanes of nodes, without counting the frame."""
+        """Process a decoded frame: add its events to the chart of its node.
+
+        The frame is not counted.
+        """
         kind, node, channel = decoded.kind, decoded.node, record.channel
         since_us = self.since(record.at_us)
         row = None if node is None else self.row(channel, node)
@@ -416,12 +427,12 @@ class _Excerpt:
 def excerpts(
     pieces: Iterable[Sequence[Record]], numbers: Iterable[int], frames: int
 ) -> dict[int, _Frames]:
-    """Return the frames around given frames.
+    """Return an excerpt of a log around each of some frames, such as the frames of faults.
 
     Args:
-        pieces: all frames of a log, in successive pieces.
-        numbers: positions of the given frames in the log, from 1.
-        frames: number of frames before and after each given frame.
+        pieces: all frames of the log in order, divided into pieces of any length.
+        numbers: positions of the chosen frames in the log, from 1.
+        frames: number of frames to include before and after each chosen frame.
 
     Returns:
         The position of the first frame of each excerpt in the log, and its frames, by number.

@@ -177,7 +177,11 @@ class _LineRow(NamedTuple):
 
 
 class LineTraffic:
-    """Counter of messages on serial lines. Its memory grows with the kinds of messages only."""
+    """Counter of the messages on serial lines, for the table of `canmon top`.
+
+    The counter has a row for each kind of message, so its memory does not grow with the number of
+    messages.
+    """
 
     def __init__(self) -> None:
         self._rows: dict[tuple[str, bool, str], _LineRow] = {}
@@ -213,7 +217,7 @@ def _word_of(decoded: Decoded) -> str:
 
 
 def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]:
-    """Return the table of serial lines as text lines, empty if there are no rows."""
+    """Return the lines of the table of serial traffic in `canmon top`, or no lines without rows."""
     if not rows:
         return []
     names = [f"{row.channel} {ARROWS[row.sent]} {row.word}" for row in rows]
@@ -261,18 +265,18 @@ _ORDER_KEYS: Final[dict[RowOrder, Callable[[traffic.IdRow], float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """Settings of the display of the table.
+    """Settings that determine how the table of `canmon top` is displayed.
 
     Attributes:
         order: order of the rows.
-        bits: whether to show bits instead of bytes.
+        bits: whether to show the payload as bits instead of bytes.
         held: whether the display is paused.
-        top: number of rows scrolled past.
+        top: number of rows that are scrolled past at the top.
         styled: whether to mark changes. Text for a file has no marks.
-        bit_rate: bit rate of the buses, or None if unknown.
-        keys: whether to show a line with the keys.
-        meaning: function that returns the meaning of the latest frame of a row, shown instead of
-            its bytes.
+        bit_rate: bit rate of the buses in bit/s, or None if unknown.
+        keys: whether to show a line with the available keys.
+        meaning: function that returns the decoded meaning of the latest frame of a row, which is
+            shown instead of the bytes, or None to show the bytes.
         unread: number of received items that are not CAN or CAN FD frames.
     """
 
@@ -294,10 +298,12 @@ def render(
     width: int = UNBOUNDED,
     height: int = UNBOUNDED,
 ) -> list[str]:
-    """Return the table as at most `height` lines of at most `width` characters.
+    """Return the table of `canmon top` as lines of text.
+
+    There are at most `height` lines, and a line has at most `width` characters.
 
     Args:
-        snapshot: traffic to show.
+        snapshot: statistics of the traffic to show.
         view: settings of the display.
         lost: number of lost frames.
         width: width of the screen in characters.
@@ -403,13 +409,13 @@ _ORDERS: Final = tuple(RowOrder)
 
 
 class TopModel:
-    """The traffic, and the view of the traffic.
+    """State of `canmon top`: the statistics of the traffic and the settings of the display.
 
     Args:
         rates: bit rates of the buses.
 
     Attributes:
-        traffic: the counted traffic.
+        traffic: statistics of the counted traffic.
         view: settings of the display.
     """
 
@@ -494,7 +500,7 @@ class TopModel:
 
 
 def meaning_text(decoded: Decoded) -> str:
-    """Return the meaning of a frame as text, with the node and the source of the names."""
+    """Return the decoded meaning of a frame as text, with its node and the source of the names."""
     node = "" if decoded.node is None else f"{decoded.node} "
     source = f" ({decoded.source})" if decoded.source else ""
     return in_cells(f"{node}{decoded.kind} {decoded.text}".rstrip() + source)

@@ -25,16 +25,18 @@ _Key = tuple[str, int]
 
 
 class TraceRow(NamedTuple):
-    """One frame of the trace, or one line of a serial port.
+    """A row of a trace: one frame, or one message of a serial line.
 
     Attributes:
-        number: number of the frame since the trace began, from 0.
+        number: number of the row since the trace began, from 0.
         record: frame of the row.
-        since_us: time since the previous frame on any bus, or None for the first frame.
-        gap_us: time since the previous frame with this identifier on this bus, or None for the
-            first frame.
-        changed: bits in which the payload differs from that previous frame; see `BitRow`.
-        decoded: decoded meaning of the frame, if it was decoded.
+        since_us: time since the previous frame on any bus in microseconds, or None for the first
+            frame.
+        gap_us: time since the previous frame with the same CAN-ID on the same bus in microseconds,
+            or None for the first such frame.
+        changed: bits in which the payload differs from that of the previous frame with this CAN-ID;
+            see `BitRow`.
+        decoded: decoded meaning of the frame, or None if it was not decoded.
     """
 
     number: int
@@ -46,13 +48,13 @@ class TraceRow(NamedTuple):
 
 
 class Ring:
-    """Numbered rows of a trace, of which the latest are kept.
+    """Buffer of trace rows with a fixed capacity. A new row replaces the oldest one.
 
     Args:
         capacity: number of rows that are kept.
 
     Attributes:
-        count: number of rows that were added.
+        count: number of all rows that were added, which is also the number of the next row.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -96,16 +98,16 @@ class Ring:
 
 
 class FrameTrace(Ring):
-    """The latest frames. Older frames are removed and counted.
+    """Buffer of the latest frames, as rows with the time since the previous frame.
 
-    If time goes back, the time between the frames is 0.
+    If the time of a frame is earlier than that of the previous frame, the time between them is 0.
 
     Args:
-        capacity: number of frames to keep.
+        capacity: number of frames to keep. Older frames are removed.
 
     Attributes:
-        origin_us: time of the first frame, which is the origin of displayed times, or None before
-            the first frame.
+        origin_us: time of the first frame, from which displayed times count, or None before the
+            first frame.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -155,11 +157,11 @@ def _since(at_us: int, before_us: int | None) -> int | None:
 
 
 class Latest(NamedTuple):
-    """The latest frame of one identifier of one bus.
+    """The latest frame with one CAN-ID on one bus that passed a display filter.
 
     Attributes:
-        row: latest frame that passed.
-        frames: number of frames that passed.
+        row: row of this frame.
+        frames: number of frames with the CAN-ID that passed.
     """
 
     row: TraceRow
@@ -167,10 +169,10 @@ class Latest(NamedTuple):
 
 
 class DisplayFilter:
-    """The rows of a trace that pass a filter, updated as the trace grows.
+    """The rows of a trace that pass a filter. The rows are updated as the trace grows.
 
     Args:
-        trace: source of the rows. Rows that it already holds are included.
+        trace: trace that supplies the rows. Rows that it already holds are filtered, too.
         wanted: function that returns whether a row passes, or None for all rows.
 
     Attributes:

@@ -62,7 +62,7 @@ def middle_us(bucket: int) -> int:
 
 
 def quantile(counts: Mapping[int, int], per_mille: int) -> int:
-    """Return the bucket that contains a quantile of the values.
+    """Return the bucket of a histogram that contains a quantile of the counted values.
 
     Args:
         counts: number of values in each bucket. There is at least one value.
@@ -87,18 +87,22 @@ _CYCLIC_PERCENT: Final = 75
 
 
 class GapRow(NamedTuple):
-    """Statistics of all gaps of one identifier.
+    """Statistics of the gaps, the times between successive frames with the same CAN-ID.
+
+    All times are in microseconds.
 
     Attributes:
         min_us: shortest gap.
         mean_us: mean of the gaps, rounded down.
-        p99_us: quantile of 99 %. At most 1 % of the gaps were longer, and the value is at most one
-            part in 64 too long.
+        p99_us: quantile of 99 %: at most 1 % of the gaps were longer. The value is at most 1/64 too
+            long.
         max_us: longest gap.
         jitter_us: mean difference between a gap and the previous gap, rounded down.
-        cycle_us: cycle of the frames, including missed frames. The value is None unless three
-            quarters of the gaps are within a quarter of the median.
-        missed: upper limit of the number of missed frames of that cycle, or None without a cycle.
+        cycle_us: period of cyclic frames, corrected for missed frames, or None if the frames are
+            not cyclic. Frames are cyclic if three quarters of the gaps are within a quarter of the
+            median.
+        missed: upper limit of the number of frames that were missed in that cycle, or None if the
+            frames are not cyclic.
     """
 
     min_us: int
@@ -111,15 +115,18 @@ class GapRow(NamedTuple):
 
 
 class Gaps:
-    """Counter of gaps. Its memory does not grow with the number of gaps.
+    """Counter of the gaps between frames with the same CAN-ID.
+
+    The memory does not grow with the number of gaps, because gaps are counted in buckets of a
+    histogram. All times are in microseconds.
 
     Attributes:
         count: number of gaps.
         total_us: sum of the gaps.
         min_us: shortest gap.
         max_us: longest gap.
-        wander_us: sum of the differences between each gap and the previous gap.
-        buckets: number of gaps in each bucket.
+        wander_us: sum of the absolute differences between each gap and the previous gap.
+        buckets: number of gaps in each bucket of the histogram.
     """
 
     __slots__ = ("_last_us", "buckets", "count", "max_us", "min_us", "total_us", "wander_us")
@@ -184,15 +191,16 @@ PAYLOAD_BITS: Final = 64
 
 
 class BitRow(NamedTuple):
-    """Changes of bits in the payloads of one identifier.
+    """Statistics of the bits that changed in the payloads of one CAN-ID.
 
-    A payload is a number here: bit 0 of byte 0 is bit 0, and bit 7 of byte 7 is bit 63. In CAN FD
-    the bits continue to bit 511.
+    A set of bits is stored as an integer: bit 0 of byte 0 is bit 0, and bit 7 of byte 7 is bit 63.
+    In CAN FD, the bits continue to bit 511.
 
     Attributes:
-        latest: bits in which the latest payload differs from the one before.
-        planes: change counts of the payload bits. Plane n holds bit n of each count.
-        notched: bits whose changes are known, and therefore not shown.
+        latest: bits in which the latest payload differs from the previous one.
+        planes: number of changes of each payload bit, in binary. Integer n of the tuple holds
+            binary digit n of the numbers of all bits.
+        notched: bits whose changes the user marked as known, so they are not shown.
     """
 
     latest: int = 0
@@ -205,9 +213,10 @@ class BitRow(NamedTuple):
         return reduce(or_, self.planes, 0) & ~self.notched
 
     def counts(self) -> tuple[int, ...]:
-        """Return the number of changes of each bit.
+        """Return the number of changes of each payload bit, in order from bit 0 of byte 0.
 
-        The result has 64 counts, or in CAN FD the counts of all bits up to the highest changed one.
+        The result has 64 counts. In CAN FD, it has the counts of all bits up to the highest changed
+        bit.
 
         >>> BitRow(planes=(0b01, 0b11)).counts()[:3]
         (3, 2, 0)
@@ -220,12 +229,13 @@ class BitRow(NamedTuple):
 
 
 class BitMemory:
-    """Counter of the changes of each payload bit. One big number holds one digit of all counts.
+    """Counter of the changes of each payload bit of one CAN-ID.
 
-    A payload that is shorter than the previous one is padded with zeros.
+    All counters are updated at once: one big integer holds one binary digit of all counters. A
+    payload that is shorter than the previous one is padded with zeros.
 
     Attributes:
-        notched: bits whose changes are known.
+        notched: bits whose changes the user marked as known.
     """
 
     __slots__ = ("_latest", "_payload", "_planes", "notched")
@@ -259,19 +269,20 @@ class BitMemory:
 
 
 class IdRow(NamedTuple):
-    """The traffic of one identifier on one bus.
+    """Statistics of the traffic with one CAN-ID on one bus.
 
     Attributes:
         channel: name of the bus.
-        ident: identifier as in `ident_of` and `fd_ident`.
+        ident: CAN-ID with flags, as `ident_of` and `fd_ident` return it.
         frames: number of frames.
         first_us: time of the first frame.
         last_us: time of the latest frame.
-        frame: latest frame of the identifier.
-        gap_us: latest gap, or None before the second frame.
+        frame: latest frame.
+        gap_us: time between the two latest frames in microseconds, or None before the second frame.
         gaps: statistics of all gaps, or None before the second frame.
-        bits: number of bits of all frames on the bus. CAN FD frames count as in `BitRates`.
-        changed: changes of the payload bits.
+        bits: total number of bits that all frames needed on the bus. `BitRates` defines the number
+            for CAN FD frames.
+        changed: statistics of the payload bits that changed.
     """
 
     channel: str
@@ -287,7 +298,10 @@ class IdRow(NamedTuple):
 
     @property
     def rate_hz(self) -> float:
-        """Frames per second from the first to the latest frame, or 0 if that took no time."""
+        """Average number of frames per second from the first to the latest frame.
+
+        The rate is 0 if both have the same time.
+        """
         span_us = self.last_us - self.first_us
         return (self.frames - 1) * 1e6 / span_us if span_us > 0 else 0.0
 
@@ -353,11 +367,11 @@ class _IdTally:
 
 
 class BitRates(NamedTuple):
-    """Bit rates in bit/s, with None for unknown rates.
+    """Bit rates of a CAN bus in bit/s, for the calculation of bus load. None is an unknown rate.
 
     Attributes:
-        nominal: bit rate of the arbitration phase, and of a whole classic frame.
-        fast: bit rate of the data phase of CAN FD frames with BRS.
+        nominal: bit rate of classic frames, and of the arbitration phase of CAN FD frames.
+        fast: bit rate of the data phase of CAN FD frames with bit rate switch (BRS).
     """
 
     nominal: int | None = None
@@ -368,9 +382,10 @@ class BitRates(NamedTuple):
         return not frame.brs or bool(self.nominal and self.fast)
 
     def bits(self, frame: can.FdFrame) -> int:
-        """Return the duration of a frame, in bits of the nominal rate, rounded up.
+        """Return the duration of a CAN FD frame on the bus, in bits of the nominal rate.
 
-        If a rate is unknown, fast bits count as nominal bits. The frame is then in fact shorter.
+        The number is rounded up. If a rate is unknown, bits at the fast rate count as bits at the
+        nominal rate, so the real duration is shorter.
         """
         nominal, fast = can.fd_bits(frame)
         if self.nominal and self.fast:
@@ -455,10 +470,10 @@ WINDOW_US: Final = 1_000_000
 
 
 class BusSecond(NamedTuple):
-    """A second of a bus.
+    """Amount of traffic on one bus within one second.
 
     Attributes:
-        at_us: start of the second.
+        at_us: start of the second in microseconds.
         bits: number of bits of the frames that ended in this second.
     """
 
@@ -483,9 +498,9 @@ class _LoadRow(NamedTuple):
 
 
 class Load:
-    """Sum of the bits of each second, counted from the first frame.
+    """Bus load: counter of the bits in each second, counted from the first frame.
 
-    A frame with an earlier time than a previous frame counts for the present window.
+    A frame whose time is before that of a previous frame counts for the present second.
     """
 
     __slots__ = ("_bits", "_ended", "_first_us", "_open", "_peak")
@@ -495,7 +510,7 @@ class Load:
         self._open = self._ended = self._peak = BusSecond(first_us, 0)
 
     def take(self, at_us: int, bits: int) -> BusSecond | None:
-        """Count a frame.
+        """Count the bits of a frame.
 
         Returns:
             The window that the time of the frame has ended, if any.
@@ -538,7 +553,7 @@ def _window_begin(first_us: int, at_us: int) -> int:
 
 
 class BusRow(NamedTuple):
-    """The traffic of one bus.
+    """Statistics of the traffic on one bus, for the display of bus load and errors.
 
     Attributes:
         channel: name of the bus.
@@ -547,10 +562,10 @@ class BusRow(NamedTuple):
         last_us: time of the latest frame or error frame.
         load: load of the bus.
         errors: statistics of the error frames.
-        went_back: number of frames with an earlier time than the previous frame.
+        went_back: number of frames whose time is earlier than that of the previous frame.
         fd: number of CAN FD frames.
-        unrated: number of CAN FD frames with data at an unknown bit rate. If it is not 0, the real
-            load is higher than the reported load.
+        unrated: number of CAN FD frames whose data was sent at an unknown bit rate. If it is not 0,
+            the real load is higher than the calculated load.
     """
 
     channel: str
@@ -565,12 +580,12 @@ class BusRow(NamedTuple):
 
 
 class TrafficSnapshot(NamedTuple):
-    """All rows at one moment. The rows never change.
+    """Statistics of all traffic at one moment. The snapshot does not change with later traffic.
 
     Attributes:
-        at_us: moment of the snapshot.
-        buses: rows of the buses by name.
-        rows: rows of the identifiers by bus and identifier.
+        at_us: time of the snapshot in microseconds.
+        buses: statistics of each bus, by its name.
+        rows: statistics of each CAN-ID, by bus and CAN-ID with flags.
     """
 
     at_us: int = 0
@@ -637,11 +652,10 @@ class _BusTally:
 
 
 class Traffic:
-    """Counter for all frames of all buses.
+    """Counter of all frames on all buses. `snapshot` returns the statistics.
 
-    The memory of the counter grows with the number of identifiers, not with the number of frames.
-
-    Frames that were lost before they were read are not counted; see `Loss`.
+    The memory grows with the number of CAN-IDs, not with the number of frames. Frames that were
+    lost before they were read are not counted; see `Loss`.
 
     Args:
         rates: bit rates of all buses, used for CAN FD.
@@ -666,15 +680,18 @@ class Traffic:
         self._buses.clear()
 
     def notch(self) -> None:
-        """Treat all bits that have changed as known. From now on, only other bits are shown."""
+        """Mark all payload bits that have changed so far as known.
+
+        Only changes of other bits are shown from then on.
+        """
         for bus in self._buses.values():
             bus.notch()
 
     def snapshot(self, now_us: int | None = None) -> TrafficSnapshot:
-        """Return all rows.
+        """Return the present statistics of all buses and CAN-IDs.
 
         Args:
-            now_us: current time. By default, it is the time of the latest frame.
+            now_us: present time in microseconds. By default, it is the time of the latest frame.
         """
         at_us = self._last_us if now_us is None else now_us
         buses = [self._buses[name] for name in sorted(self._buses)]

@@ -109,7 +109,10 @@ class _ChecksumField:
 
 @dataclass(frozen=True, slots=True)
 class FrameFields:
-    """The fields of a frame that change each time. Counters are set first, then checksums."""
+    """The data fields of a cyclic frame that change with each transmission: counters and checksums.
+
+    Counters are set first, so that the checksums cover them.
+    """
 
     counters: tuple[_Counter, ...] = ()
     checksums: tuple[_ChecksumField, ...] = ()
@@ -134,7 +137,7 @@ class FrameFields:
 
 
 def parse_counter(text: str) -> _Counter:
-    """Parse a counter of a byte, such as `0:0..255`, or of some bits, such as `0.4+4:0..14`.
+    """Parse the description of a counter in the data of a frame that is sent repeatedly.
 
     `0:0..255` counts byte 0 from 0 to 255. `0.4+4:0..14` counts 4 bits of byte 0, from bit 4 on,
     from 0 to 14.
@@ -157,7 +160,10 @@ def parse_counter(text: str) -> _Counter:
 
 
 def parse_checksum(text: str) -> _ChecksumField:
-    """Read `BYTE:ALGORITHM`, such as `7:crc8`, or with a range of bytes, such as `7:crc8:1..6`.
+    """Parse the description of a checksum in the data of a frame that is sent repeatedly.
+
+    It has the form `BYTE:ALGORITHM`, such as `7:crc8`. A range of bytes may follow, as in
+    `7:crc8:1..6`.
 
     Raises:
         ValueError: the text is not a checksum.
@@ -188,10 +194,10 @@ class _Place(NamedTuple):
 
 
 class PdoFrames:
-    """Factory that makes frames from the names that users give.
+    """Encoder of PDOs from names, such as `5.rpdo1 target_velocity=100`.
 
-    An object that is not named gets its stored value, or else its power-on value, or else 0. Values
-    are those on the wire, without scaling.
+    An object that the text does not name gets its last sent value, otherwise its power-on value,
+    otherwise 0. Values are raw values without scaling.
 
     Args:
         eds: content of EDS files by node-ID.
@@ -202,19 +208,18 @@ class PdoFrames:
         self._remembered: dict[str, dict[str, int]] = {}
 
     def remember(self, text: str) -> None:
-        """Store the values of a sent frame.
+        """Store the values that a sent PDO gave to its objects.
 
-        The values are used for objects that a later frame does not name.
+        A later PDO that does not name these objects uses the stored values.
         """
         pdo, (_, fields) = text.split(maxsplit=1)[0].lower(), self._fields(text)
         self._remembered[pdo] = {place.name: value for place, value in fields}
 
     def frame(self, text: str) -> CanFrame:
-        """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
+        """Encode a PDO that is written as `NODE.rpdoN NAME=VALUE ...`, and return its frame.
 
         Raises:
-            ValueError: a node, PDO, object or value is unknown. The message contains the known
-                ones.
+            ValueError: a node, PDO, object or value is unknown. The message lists the known ones.
         """
         can_id, fields = self._fields(text)
         return CanFrame(can_id, pack_bits([(value, place.mapped.bits) for place, value in fields]))
@@ -348,7 +353,7 @@ class TransmitRow:
         return self.due_us < NEVER
 
     def enable(self, now_us: int) -> None:
-        """Start to send the row in each period. Counters continue at their last value.
+        """Start to send the row cyclically. Counters continue at their last value.
 
         Raises:
             ValueError: the row has no period.
@@ -383,16 +388,16 @@ class TransmitRow:
 
 @dataclass(slots=True)
 class TransmitList:
-    """Rows that can be sent when the list is armed.
+    """List of frames that the user can send, once or cyclically, in the monitor.
 
     Nothing is sent until the list is armed. `stop` disarms the list and disables all rows, so that
-    arming the list again sends nothing by itself.
+    arming it again does not send anything by itself.
 
     Args:
         rows: rows of the list.
 
     Attributes:
-        armed: whether rows may send.
+        armed: whether the list is armed, so that rows may be sent.
     """
 
     rows: list[TransmitRow] = field(default_factory=list)
@@ -410,12 +415,27 @@ class TransmitList:
             row.disable()
 
     def enable(self, number: int, now_us: int) -> None:
-        """Start to send a row in each period. Raise ValueError if that is not allowed."""
+        """Start to send a row cyclically, in its period.
+
+        Args:
+            number: number of the row in the list, from 0.
+            now_us: present time in microseconds.
+
+        Raises:
+            ValueError: the list is not armed, or the row has no period.
+        """
         self._check_armed()
         self.rows[number].enable(now_us)
 
     def once(self, number: int) -> AnyFrames:
-        """Return the frame of a row to send now. Raise ValueError if the list is not armed."""
+        """Return the frame that sends a row once, now.
+
+        Args:
+            number: number of the row in the list, from 0.
+
+        Raises:
+            ValueError: the list is not armed.
+        """
         self._check_armed()
         return self.rows[number].once()
 
@@ -451,14 +471,15 @@ _OPTIONS: Final = ("every", "counter", "checksum", "name")
 
 @dataclass(frozen=True, slots=True)
 class RowText:
-    """The parts of the text of a row.
+    """A row of the transmit list as text that the user can edit, divided into its parts.
 
     Attributes:
         frame: a frame such as `123#DEADBEEF`, or a PDO such as `5.rpdo1 target_velocity=100`.
-        every: period of the row, such as `10ms`, empty for a row that is sent by hand.
-        counters: bytes that count, such as `0:0..255`.
-        checksums: bytes that are computed, such as `7:crc8`.
-        name: displayed name of the row, empty to show the frame.
+        every: period of a row that is sent cyclically, such as `10ms`, or empty for a row that is
+            sent by hand.
+        counters: descriptions of counters in the data, such as `0:0..255`.
+        checksums: descriptions of checksums in the data, such as `7:crc8`.
+        name: displayed name of the row, or empty to show the frame.
     """
 
     frame: str
@@ -477,10 +498,10 @@ class RowText:
         return " ".join(words)
 
     def row(self, pdos: PdoFrames) -> TransmitRow:
-        """Return the row with the frame to send.
+        """Parse the parts of the text, and return the row of the transmit list that they describe.
 
         Raises:
-            ValueError: a frame, time or field is invalid.
+            ValueError: the frame, the period, a counter or a checksum is invalid.
         """
         is_frame = "#" in self.frame
         frame = CanFrame.parse(self.frame) if is_frame else pdos.frame(self.frame)
@@ -494,9 +515,12 @@ class RowText:
 
 
 def parse_row_text(text: str) -> RowText:
-    """Read the text of a row. Raise ValueError if it is not a row.
+    """Divide the text of a row of the transmit list into its parts.
 
-    The contents of the parts are not checked here. `RowText.row` checks them.
+    The contents of the parts are checked later by `RowText.row`.
+
+    Raises:
+        ValueError: the text is not a row.
     """
     try:
         words = iter(shlex.split(text))

@@ -32,12 +32,12 @@ _ANSWER_US: Final = 500_000
 
 @dataclass(frozen=True, slots=True)
 class NetCall:
-    """The options of `canmon net` that precede the verb.
+    """The options of `canmon net` that stand before the name of the subcommand.
 
     Attributes:
-        word: SOURCE word, or None if the options name a bus.
+        word: SOURCE word that names the bus, or None if the options name it.
         bus: options of the bus.
-        timeout_us: time-out for an answer.
+        timeout_us: time to wait for an answer in microseconds.
     """
 
     word: str | None

@@ -27,16 +27,17 @@ _DEVICE_TYPE = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class LssSettings:
-    """Options of `net lss` on the command line.
+    """The options of the command `canmon net lss`.
 
     Attributes:
         address: LSS address of the slave, or None for slaves found by fastscan.
-        only_node: whether the command is for the only slave on the bus.
-        node_ids: new node-IDs, one for each slave, or empty for none.
-        bit_rate: new bit rate in bit/s, or None for no change.
-        delay_ms: delay for activating the bit rate, or None for no activation.
-        store: whether the slave stores node-ID and bit rate.
-        dry_run: whether to leave the slaves unchanged.
+        only_node: whether the command addresses the only slave on the bus, without an LSS address.
+        node_ids: new node-IDs, one for each slave, or empty to keep the node-IDs.
+        bit_rate: new bit rate in bit/s, or None to keep the bit rate.
+        delay_ms: delay before the slaves switch to the new bit rate in milliseconds, or None not to
+            switch.
+        store: whether the slaves store their node-ID and bit rate.
+        dry_run: whether to only show what would be done, and leave the slaves unchanged.
     """
 
     address: LssAddress | None = None
@@ -68,12 +69,12 @@ _MOST_FOUND: Final = 127
 
 
 class LssWork:
-    """One call of `net lss`.
+    """Execution of one `canmon net lss` command: find LSS slaves, then configure them.
 
     Args:
-        session: session with the open bus.
+        session: session of the command with the open bus.
         master: LSS master on the bus.
-        settings: options of the call.
+        settings: options of the command.
     """
 
     def __init__(
@@ -82,11 +83,11 @@ class LssWork:
         self._session, self._master, self._settings = session, master, settings
 
     def run(self, *, yes: bool) -> None:
-        """Execute the call.
+        """Execute the command. `yes` skips the question to the user.
 
         Raises:
             Refused: a node-ID is in use, or the user declined.
-            NodeFailed: a slave refused, or there is no slave.
+            NodeFailed: a slave refused a command, or no slave was found.
         """
         settings = self._settings
         for node_id in settings.node_ids:

@@ -66,13 +66,13 @@ _SUBS: Final = range(9)
 
 
 class NamedObjects:
-    """The known objects of one node.
+    """Names, types and units of the objects of one node, as its EDS describes them.
 
     Args:
         node_id: node-ID of the node.
-        file: EDS of the node, or None for no file.
-        known: content of the EDS, if it is known without a file.
-        name: name of that known EDS.
+        file: EDS file of the node, or None for no file.
+        known: description of the device, if it is known without a file.
+        name: name of the EDS that `known` is from.
 
     Attributes:
         node_id: node-ID of the node.
@@ -112,7 +112,10 @@ class NamedObjects:
         return self._memory.describe(*entry)
 
     def size(self, entry: Entry) -> int:
-        """Return the size of an object in bytes, or 0 if the size varies or is unknown."""
+        """Return the size of an object in bytes, as the EDS gives it.
+
+        The size is 0 if it varies or is unknown.
+        """
         kind = self.text(entry).kind
         return 0 if kind is None else kind.size
 
@@ -121,7 +124,9 @@ class NamedObjects:
         return f"{write_entry(entry)} {self.text(entry).name}".rstrip()
 
     def find(self, word: str) -> Entry:
-        """Return the object that a word names, such as `statusword`, `1018h:1` or `0x6041`.
+        """Return index and sub-index of the object that the user named.
+
+        The text is a name or an index, such as `statusword`, `1018h:1` or `0x6041`.
 
         Raises:
             Refused: the object does not exist.
@@ -186,14 +191,17 @@ def known_objects(
     what: str = "--eds",
     strict: bool = False,
 ) -> NamedObjects:
-    """Return the known objects of a node. The identity is read from the node.
+    """Return the names and types of the objects of a node, from the EDS that describes it.
+
+    The device type, and with an EDS also the identity, is read from the node.
 
     Args:
         session: session with the open bus.
         node_id: node-ID of the node.
-        eds: EDS of the node, or a folder that contains the EDS.
-        what: option or argument that names the EDS, used in messages.
-        strict: whether to refuse an EDS of another device. Otherwise, print a warning.
+        eds: EDS file of the node, or a folder in which the file is searched.
+        what: option or argument that gave the EDS, for messages.
+        strict: whether to refuse an EDS that describes another device. Otherwise, the function
+            prints a warning.
 
     Raises:
         Refused: the EDS cannot be used.
@@ -255,9 +263,9 @@ For a longer domain, only the size is shown.
 
 
 def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
-    """Return a value with its unit as text.
+    """Return the value of an object as text with its unit, for the output of a command.
 
-    Integers are also in hex, identifiers and bits only in hex.
+    Integers are also shown in hex. Identifiers and bit fields are shown only in hex.
     """
     text = objects.text(entry)
     if len(data) > _MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
@@ -274,12 +282,12 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
 
 
 def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
-    """Return the bytes of a value.
+    """Encode a value that the user typed to the bytes of an object.
 
-    A value is written as `100`, `0x64`, `u16:100`, or `-1.5` in the unit of the object.
+    The value is written as `100`, `0x64`, `u16:100`, or `-1.5` in the unit of the object.
 
     Raises:
-        Refused: the text is not a value of the object.
+        Refused: the text is not a valid value for the object.
     """
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
@@ -308,7 +316,10 @@ def _range(text: node_memory.ObjectText) -> str:
 
 
 def limits(objects: NamedObjects, entry: Entry) -> str:
-    """Return the range of a value in the EDS, for a message, or an empty text without a range."""
+    """Return the range of values that the EDS allows for an object, as the final part of a message.
+
+    The text is empty if the EDS gives no range.
+    """
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):
         return ""
@@ -338,7 +349,18 @@ class _ValueDifference(NamedTuple):
 def differences(
     session: NetSession, objects: NamedObjects, values: Mapping[Entry, bytes]
 ) -> Iterator[_ValueDifference]:
-    """Read objects of a node. Yield those that differ. Raise SdoTimeout if it does not answer."""
+    """Read objects of a node, and yield each object whose value differs from the wanted value.
+
+    An object that cannot be read is yielded, too.
+
+    Args:
+        session: session with the open bus.
+        objects: objects of the node.
+        values: wanted value of each object.
+
+    Raises:
+        SdoTimeout: the node does not answer.
+    """
     for entry, wanted in sorted(values.items()):
         row = objects.rows.get(entry)
         if row is not None and not row.readable:

@@ -287,13 +287,16 @@ _COMMUNICATION: Final = 2
 
 
 def save(session: NetSession, node_id: int, sub: int) -> None:
-    """Make a node store parameters. Raise NodeFailed if it cannot store them.
+    """Make a node store its parameters in non-volatile memory, by a write to 1010h.
 
     Args:
         session: session with the open bus.
         node_id: node-ID of the node.
         sub: sub-index of 1010h: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh. Further
             sub-indices are manufacturer-specific.
+
+    Raises:
+        NodeFailed: the node cannot store these parameters.
     """
     _check_saves(session, node_id, sub)
     with of_node(node_id):
@@ -324,7 +327,11 @@ def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
 
 
 def reset(session: NetSession, node_id: int, sub: int) -> None:
-    """Reset a node, or only its communication if only that was restored. Wait for its boot-up."""
+    """Reset a node after its parameters were restored, and wait for its boot-up.
+
+    `sub` is the sub-index of 1011h that was written. If it is that of the communication parameters,
+    only the communication of the node is reset.
+    """
     communication = sub == _COMMUNICATION
     command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
     session.bus.command(command, node_id)

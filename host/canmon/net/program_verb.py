@@ -39,11 +39,11 @@ _S_US = 1_000_000
 
 
 class ProgressBar:
-    """Progress display of a transfer with bytes, total and rate.
+    """Progress display of a program download, with the number of bytes, their total, and the rate.
 
     Args:
         total: total number of bytes.
-        now_us: function that returns the time of the bus.
+        now_us: function that returns the present time of the bus in microseconds.
     """
 
     def __init__(self, total: int, now_us: Callable[[], int]) -> None:

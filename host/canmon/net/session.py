@@ -34,9 +34,9 @@ _LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
 
 
 class NodeFailed(click.ClickException):
-    """A node refused, or did not answer.
+    """A node refused a request of a `canmon net` command, or did not answer.
 
-    The error ends the verb with one line on standard error, and exit status 1.
+    The error ends the command with one line on standard error, and exit status 1.
     """
 
     exit_code = 1
@@ -67,7 +67,10 @@ class _Work:
         self._done += 1
 
     def progress(self) -> str:
-        """Return a text with the finished and the open steps, empty if no steps were planned."""
+        """Return a text with the finished and the open steps of the command.
+
+        The text is empty if no steps were planned.
+        """
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
         said = [f"{word}: {_listed(items)}" for word, items in parts if items]
@@ -82,15 +85,15 @@ def _listed(steps: list[str]) -> str:
 
 
 class NetSession:
-    """The session of a verb with an open bus.
+    """State of one running `canmon net` command: the open bus and the steps of the command.
 
     Args:
-        source: bus with the known nodes.
-        timeout_us: time to wait for an answer.
+        source: open bus, with what is known about its nodes.
+        timeout_us: time to wait for an answer in microseconds.
 
     Attributes:
-        bus: bus that communicates with the nodes.
-        work: planned steps of the verb.
+        bus: client that exchanges SDO and NMT messages with the nodes.
+        work: planned and finished steps of the command.
     """
 
     def __init__(self, source: ConformSource, timeout_us: int) -> None:
@@ -98,15 +101,17 @@ class NetSession:
         self.bus, self.work = NodeBus(source.link, timeout_us), _Work()
 
     def confirm(self, what: str, *, yes: bool, risk: str = "") -> None:
-        """Ask the user before a change, except for a rig in virtual time.
+        """Ask the user before a command changes a node.
+
+        In the virtual time of a rig, it does not ask.
 
         Args:
-            what: description of the change.
-            yes: whether `--yes` was given, which skips the question.
-            risk: physical risk as a sentence, empty for none.
+            what: description of the change, which becomes the question.
+            yes: whether the option `--yes` was given, which skips the question.
+            risk: sentence about the physical risk, or empty for none.
 
         Raises:
-            Refused: the answer is no, or there is no terminal to ask.
+            Refused: the user answered no, or there is no terminal to ask.
         """
         text = one_line(f"{what}. {risk}" if risk else f"{what}.")
         if yes or self.source.virtual:
@@ -129,18 +134,20 @@ def print_plan(*steps: str) -> None:
 
 @contextmanager
 def net_session(call: NetCall, node_id: int | None = None) -> Iterator[NetSession]:
-    """Open the bus, and close it at the end. An error ends the verb with one line.
+    """Context manager that opens the bus of a `canmon net` command, and closes it at the end.
+
+    An error ends the command with one line on standard error.
 
     Args:
-        call: call with the options of the bus.
-        node_id: node-ID of the node, which selects the bus of a rig with several buses. None
-            selects the first bus.
+        call: options of the command, which name the bus.
+        node_id: node-ID of the node, which selects the bus if a rig has several. None selects the
+            first bus.
 
     Raises:
         Refused: the source is not a bus with nodes.
-        NodeFailed: a node refused or did not answer.
+        NodeFailed: a node refused a request, or did not answer.
         SourceFailed: the bus failed.
-        Exit: the user interrupted the verb.
+        Exit: the user interrupted the command.
     """
     source = open_conform_source(call.word, node_id, call.bus)
     session, ended = NetSession(source, call.timeout_us), False
@@ -181,7 +188,7 @@ def failure_text(error: SdoFailed, title: _Title = write_entry) -> str:
 
 @contextmanager
 def of_node(node_id: int, title: _Title = write_entry) -> Iterator[None]:
-    """Turn a failed SDO transfer in the block into NodeFailed, which names node and object."""
+    """Context manager that turns SdoFailed into NodeFailed, whose message names node and object."""
     try:
         yield
     except SdoFailed as error:

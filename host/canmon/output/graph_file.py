@@ -27,10 +27,10 @@ from tickrig.host.text.whole_file import replacing, write_whole
 
 
 def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
-    """Write the samples in a view, with a row for each time and a column for each series.
+    """Write the visible samples of curves as CSV: a row for each time, a column for each curve.
 
-    A cell is empty if a series has no sample at that time. If a series has several samples at that
-    time, the last sample counts. Times are seconds with six digits, as in the log.
+    A cell is empty if a curve has no sample at that time. If a curve has several samples at that
+    time, the last sample is written. Times are seconds with six decimals, as in the log.
     """
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(["t_s", *(_heading(one) for one in series)])
@@ -158,17 +158,17 @@ def check_graph_path(path: Path) -> None:
 def write_graph(
     path: Path, series: Sequence[Series], view: View, size: tuple[int, int], title: str = ""
 ) -> None:
-    """Write curves in the format that the name of the file indicates.
+    """Write curves into a file in the format that its suffix indicates, such as PNG or CSV.
 
     Args:
         path: path of the file. Its suffix is one of `_KINDS`.
         series: samples of the curves.
-        view: visible part of the curves.
+        view: part of the curves to show.
         size: width and height of a picture in pixels.
         title: title of a picture.
 
     Raises:
-        Refused: matplotlib, which PNG needs, is not installed.
+        Refused: matplotlib is not installed, which a PNG needs.
         SourceFailed: the file cannot be written.
     """
     try:

@@ -107,7 +107,7 @@ class _Screen:
         return [_ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
-        """Show lines, if the terminal has accepted the previous ones.
+        """Show lines of text, unless the terminal has not yet accepted the previous ones.
 
         Control codes in the lines have no effect, except those of colours.
         """
@@ -148,13 +148,13 @@ def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Clock that starts at the time of the latest frame, and runs with the clock of this machine.
+    """Clock of a live source, in microseconds on the clock of the frames' time stamps.
 
-    The clock of a driver's time stamps may differ from the clock of this machine. Therefore only
-    differences between time stamps are used.
+    The clock continues from the time stamp of the latest frame, and runs with the clock of this
+    machine. Both clocks may differ, so only differences between times of one clock are used.
 
     Attributes:
-        latest_us: time of the latest frame.
+        latest_us: time stamp of the latest frame in microseconds.
     """
 
     def __init__(self) -> None:
@@ -180,9 +180,9 @@ _SLACK_NS: Final = 1_000
 
 
 class Pace:
-    """Clock that counts microseconds since its creation.
+    """Clock for actions at given times, in microseconds since its creation.
 
-    The clock sleeps until absolute times, so that the actions that it times do not drift.
+    The clock waits until absolute times, so that repeated actions do not drift.
     """
 
     def __init__(self) -> None:
@@ -225,11 +225,11 @@ class _FramesLost(click.ClickException):
 
 
 def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) -> None:
-    """Report lost frames, invalid frames and other notes, then close the source.
+    """Print lost frames, invalid frames and other notes about a source at its end, and close it.
 
     Raises:
         SourceFailed: the source ended early.
-        _FramesLost: frames were lost or could not be read, and the caller is strict.
+        _FramesLost: `strict` is set, and frames were lost or could not be read.
     """
     source.close()
     for word in (*source.messages(), *more):
@@ -244,9 +244,9 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 
 
 def expect_frames(source: AnySource[object], meaning: FilteredDecoder | None = None) -> None:
-    """Exit with status 1 if filters or a cut removed all frames of a log.
+    """Exit with status 1 if no frame of a log passed the filters or the time range.
 
-    `report` prints the message.
+    `report` prints the message about this.
     """
     nothing = source.nothing_passed or (meaning is not None and meaning.nothing_passed)
     if nothing and (source.recorded or not source.live):
@@ -273,9 +273,9 @@ class _Interruptions(Interrupter):
             super().received(number, frame)
 
     def behind(self, act: Callable[Given, _Result]) -> Callable[Given, _Result]:
-        """Return the function, protected from interruptions.
+        """Return a function that calls `act` and cannot be interrupted.
 
-        An interruption during a call takes effect after the call.
+        An interruption during the call takes effect after the call.
         """
 
         def whole(*arguments: Given.args, **named: Given.kwargs) -> _Result:
@@ -293,7 +293,10 @@ class _Interruptions(Interrupter):
 
 @contextmanager
 def until_interrupted() -> Iterator[_Interruptions]:
-    """End the block at Ctrl-C and at signals that end a program. Continue after the block."""
+    """Context manager whose block ends at Ctrl-C or a termination signal.
+
+    The program then continues.
+    """
     interruptions = _Interruptions()
     # In this order, Ctrl-C before the block ends the command.
     with taking_signals(interruptions.received), suppress(KeyboardInterrupt):
@@ -315,7 +318,10 @@ span_option: Final = time_option(
 
 
 def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
-    """Return both bit rates in the options or in a SOURCE word, such as can0@500k/2M."""
+    """Return the nominal and the data bit rate of a bus.
+
+    They come from the options, or from a SOURCE word such as can0@500k/2M.
+    """
     buses = [word for word in map(parse_source, words) if isinstance(word, BusSpec)]
     nominal = [options.bitrate, *(bus.bitrate for bus in buses)]
     fast = [options.data_bitrate, *(bus.data_bitrate for bus in buses)]
@@ -331,15 +337,18 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
     *,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
-    """Read until the source ends, the time has passed or the user interrupts.
+    """Read a source and process its frames for a command.
+
+    The reading ends with the source, after the duration, or when the user interrupts.
 
     Args:
         source: source of the frames.
         words: SOURCE words that name the source.
-        take: function that is called with the records.
-        span_us: duration, or None if no duration is given.
-        lines: function that returns status lines of a live source, shown if there is a terminal.
-        press: function that is called with keys pressed on the terminal.
+        take: function that is called with each batch of records.
+        span_us: duration in microseconds, or None if the user gave no duration.
+        lines: function that returns status lines, which are shown on a terminal while the source is
+            live.
+        press: function that is called with each key that the user presses on the terminal.
     """
     with until_interrupted():
         if lines is not None and source.live and sys.stdout.isatty():
@@ -351,7 +360,10 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
 def listen(
     source: AnySource[_Item], take: Callable[[Sequence[_Item]], None], span_us: int | None
 ) -> None:
-    """Read until the source ends or the time is over. A log is timed by its own times."""
+    """Read a source and pass its frames to `take`, until the source ends or `span_us` has passed.
+
+    For a log, the time is counted by the times of its frames.
+    """
     begin_s, last_us = time.monotonic(), None
     while not (source.ended or (source.live and _is_over(begin_s, span_us))):
         records = source.poll(_POLL_US)
@@ -373,12 +385,12 @@ def say_marks(source: AnySource[object]) -> None:
 
 
 def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | None = None) -> bool:
-    """Read all blocks of a log, or until the user interrupts.
+    """Read a log in blocks, until it ends, `span_us` has passed, or the user interrupts.
 
     Args:
         log: log that is read in blocks.
         take: function that is called with each block.
-        span_us: duration by the times of the log, or None for the whole log.
+        span_us: duration in microseconds by the times of the log, or None for the whole log.
 
     Returns:
         False if the log contains CAN FD frames. The whole log must then be read frame by frame.
@@ -399,7 +411,10 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
 
 
 def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot | None:
-    """Return the statistics of a log, or None if the log must be read frame by frame."""
+    """Return the traffic statistics of a log that is read in blocks.
+
+    The result is None if there is no such log, or it must be read frame by frame.
+    """
     if log is None:
         return None
     traffic = column_traffic.ColumnTraffic()
@@ -407,7 +422,10 @@ def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot |
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
-    """Return the default time to listen, or None for files and pipes, which have an end."""
+    """Return how long a command listens by default in microseconds, or None for no limit.
+
+    Files and pipes have no limit, because they end.
+    """
     return None if not source.live or list(words) == ["-"] else _PATIENCE_US
 
 

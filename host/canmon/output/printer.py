@@ -43,15 +43,15 @@ DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 
 
 class FilteredDecoder:
-    """Decoder that returns only frames that pass a filter.
+    """Decoder of frames that drops the frames which do not pass a filter.
 
     Args:
-        decoder: decoder of frames, or None for no decoding.
+        decoder: decoder of frames, or None to leave frames undecoded.
         wanted: filter that frames must pass, or None for all frames. A filter needs a decoder.
 
     Attributes:
-        taken: number of frames before the filter.
-        passed: whether any frame passed.
+        taken: number of frames that were processed.
+        passed: whether any frame has passed the filter.
     """
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
@@ -62,15 +62,18 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return a cut of the same frames that lets the decoder see the earlier frames, too."""
+        """Return a cut of the same part of a log, which also shows earlier frames to the decoder.
+
+        The decoder learns from the frames before the part, but does not return them.
+        """
         if self._decoder is None or cut.begin is None:
             return cut
         return replace(cut, earlier=self._decoder.take)
 
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
-        """Return the wanted frames.
+        """Decode frames, and yield those that pass the filter.
 
-        All frames are decoded, because the decoder learns from each frame.
+        Frames that do not pass are decoded, too, because the decoder learns from each frame.
         """
         decoder, wanted, missing = self._decoder, self._wanted, self._missing
         self.taken += len(records)
@@ -91,9 +94,9 @@ class FilteredDecoder:
         return self._wanted is not None and self.taken > 0 and not self.passed
 
     def messages(self) -> list[str]:
-        """Return the signals and kinds in the filter that never occurred, with one line each.
+        """Return one line for each signal or kind of frame in the filter that never occurred.
 
-        If all signals and kinds occurred, the line reports that no frame passed.
+        If all of them occurred, the line reports that no frame passed.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
@@ -118,13 +121,13 @@ class DumpFormat(StrEnum):
 
 
 def printer_of(output: DumpFormat, lines: DumpLines, raw: bool, errors: bool = False) -> _Printer:
-    """Return a function that prints a frame.
+    """Return a function that formats a frame as a line of the chosen output format.
 
     Args:
         output: format of the output.
-        lines: writer of text lines.
-        raw: whether to omit the meaning of frames.
-        errors: whether to keep the meaning of error frames if `raw` is set.
+        lines: formatter of text lines.
+        raw: whether to omit the decoded meaning of frames.
+        errors: whether to show the meaning of error frames, even if `raw` is set.
     """
     write = _writer(output, lines)
     if not raw:
@@ -218,14 +221,14 @@ def _cell(text: str) -> str:
 
 
 class BlockPrinter:
-    """Writer for the lines of many frames at once, with the same result as `printer_of`.
+    """Formatter of many frames at once. It is faster than `printer_of`, with the same output.
 
     Args:
         output: format of the output, which is text or a log.
-        lines: writer of single text lines. The writer and this object continue where the other one
-            ended.
-        decoder: decoder of frames, or None for no decoding. Other code may feed the decoder between
-            two calls.
+        lines: formatter of single lines. Both may be used in turn, because each continues where the
+            other one ended.
+        decoder: decoder of frames, or None for no decoding. Other code may decode frames with it
+            between two calls.
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
@@ -234,9 +237,9 @@ class BlockPrinter:
             self._decode = column_meanings.ColumnMeanings(decoder).texts
 
     def texts(self, columns: Columns) -> Iterator[str]:
-        """Write frames that fit, each line with its end.
+        """Format the frames of a block, and yield texts of whole lines.
 
-        Control codes in the lines have no effect.
+        Control codes in the frames' texts have no effect on the terminal.
         """
         if self._output is DumpFormat.LOG:
             return iter([column_text.log_lines(columns)])
@@ -251,10 +254,11 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 
 
 class StdoutWriter:
-    """Writer to standard output. In JSON and in a log, events between frames are also lines.
+    """Writer that prints frames on standard output in the format of `canmon dump`.
 
-    A log and CSV are written with unchanged characters, so that other programs can read them again
-    exactly. This does not apply to a terminal.
+    In JSON and in a log, events between frames are also lines. A log and CSV are written with
+    unchanged characters, so that other programs can read them again exactly. This does not apply to
+    a terminal.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:

@@ -50,20 +50,20 @@ else:  # slow
 
 
 class LogFile:
-    """A running recording.
+    """A running recording of a command such as `canmon dump -l`: the files and the recorder.
 
     Args:
         plan: settings of the recording. A single file replaces an existing file.
         source: SOURCE words of the recorded source.
-        live: whether time also passes without frames.
+        live: whether time also passes while no frame arrives.
         triggers: triggers that start the recording, if the plan has a trigger.
         wanted: filter for the recorded frames, or None for all frames.
         kept: whether to keep the file if writing fails.
 
     Raises:
-        Refused: the name has no known format, the format needs a missing package, or the file is
-            being read.
-        SourceFailed: the file cannot be written, now or later.
+        Refused: the name of the file indicates no format, the format needs a package that is not
+            installed, or the file is the one that is being read.
+        SourceFailed: the file cannot be written. Methods raise it, too.
     """
 
     def __init__(  # noqa: PLR0913 - what a recording can be
@@ -89,7 +89,7 @@ class LogFile:
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
-        """Add frames, and pass them to the operating system.
+        """Record frames and marks, and pass them to the operating system.
 
         Returns:
             Whether the recording has ended.
@@ -132,13 +132,13 @@ class LogFile:
 
 @contextmanager
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
-    """Open a log for writing. The log is a new file that replaces `path` at the end.
+    """Context manager that yields a path for a log, which replaces `path` when it is complete.
 
     If the source is not a file, writing may take long, and other programs may read the log during
     that time. In this case, the log is written to `path` directly.
 
     Raises:
-        Refused: the name of the file has no known format, or the file is being read.
+        Refused: the name of the file indicates no format, or the file is being read.
         SourceFailed: the file cannot be written.
     """
     _check_not_read(path, source)
@@ -165,9 +165,9 @@ def _check_not_read(path: Path, source: Sequence[str]) -> None:
 
 
 def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
-    """Write frames into a new log.
+    """Write frames into a new log file.
 
-    Report the number of frames, and items that the format cannot hold.
+    Return lines that report the number of frames, and items that the format cannot hold.
 
     Raises:
         ValueError: the file exists already, or cannot be written.
@@ -220,13 +220,13 @@ NAMES: Final = ("rotate", "disk", "at_limit", "trigger", "pre", "post")
 
 
 class RecordingOptions:
-    """The parsed options of a recording.
+    """The parsed options of a recording on the command line or in the monitor.
 
     Args:
         path: path of the file.
-        options: options by name.
-        bit_rate: bit rate of the bus, used for a rule that limits the load.
-        parts: whether to record in parts, regardless of the options.
+        options: values of the options by name.
+        bit_rate: bit rate of the bus in bit/s, which a rule about the bus load needs.
+        parts: whether to record in parts, even if no option requires it.
 
     Attributes:
         plan: settings of the recording.
@@ -247,7 +247,15 @@ class RecordingOptions:
 
 
 def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
-    """Parse a file and options of a recording in parts. Raise Refused if they are invalid."""
+    """Parse the file name and options of a recording in parts, as after `canmon dump -l`.
+
+    Args:
+        words: text with the file name and the options.
+        bit_rate: bit rate of the bus in bit/s, or None if unknown.
+
+    Raises:
+        Refused: the text is invalid.
+    """
     try:
         command = click.Command("record", params=_params())
         context = command.make_context("record", shlex.split(words))

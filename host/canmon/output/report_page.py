@@ -63,12 +63,12 @@ _ALONE: Final = {
 
 
 class Verdict(NamedTuple):
-    """The faults that a page shows.
+    """The diagnosed faults of a recording that a report page shows, with the frames around them.
 
     Attributes:
-        diagnosis: the whole diagnosis.
-        around: surroundings of a frame by its number. The value is the number of the first frame
-            around it, and the frames around it.
+        diagnosis: result of the diagnosis.
+        around: excerpt of the log around a frame, by the number of that frame. The excerpt is the
+            number of its first frame, and its frames.
     """
 
     diagnosis: Diagnosis
@@ -77,13 +77,14 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ReportHead:
-    """The title of a page and other information about it.
+    """Title and general information of a report page.
 
     Attributes:
         title: title of the page.
-        source: description of the source.
-        about: lines at the end of the page, each with a text that is shown as code.
-        bit_rate: bit rate of the buses, or None if unknown.
+        source: description of the source, such as the name of the log.
+        about: information at the end of the page: pairs of a text and an addition that is shown as
+            code.
+        bit_rate: bit rate of the buses in bit/s, or None if unknown.
     """
 
     title: str
@@ -499,7 +500,9 @@ def _unboxed() -> Sequence[str]:
 
 
 def print_page(page: Path, path: Path) -> None:
-    """Draw a page as PDF or PNG, according to the suffix of the file.
+    """Convert an HTML page to a PDF or PNG file with Chromium.
+
+    The suffix of `path` selects the format.
 
     Raises:
         BrowserError: Chromium is not installed, or wrote no file.

@@ -55,16 +55,16 @@ _MSG_CONFIRM: Final = 0x800
 
 
 class SocketReader:
-    """Reader of the socket of an open SocketCAN bus of python-can.
+    """Reader of frames from a SocketCAN bus, directly from the socket that python-can opened.
 
     Args:
-        bus: open bus. No other code may read from the bus.
-        name: channel name of the bus in records.
+        bus: open bus of python-can. No other code may read from it.
+        name: name of the bus in the records.
 
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
         tally: counts of items that are not frames.
-        stepped: whether virtual time passes while the bus is read, which is always False.
+        stepped: whether time passes only while the bus is read, which is always False here.
     """
 
     stepped = False
@@ -151,13 +151,15 @@ _STEPPED: Final = ("tickrig",)
 
 
 def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
-    """Open a bus of the interface that the options, the configuration or the default name.
+    """Open a CAN bus with python-can.
+
+    The interface is that of the options, else of python-can's configuration, else a default.
 
     Returns:
         The bus, its interface, and the name of its channel.
 
     Raises:
-        Refused: python-can does not know an option.
+        Refused: an option is unknown to python-can.
         SourceFailed: the bus cannot be opened.
     """
     bus, interface, channel = open_raw(_with_interface(options))
@@ -177,18 +179,18 @@ def _with_interface(options: BusOptions) -> BusOptions:
 
 
 class BusReader:
-    """Reader of any bus of python-can.
+    """Reader of frames from any CAN bus that python-can supports.
 
     Args:
-        bus: open bus. No other code may read from the bus.
-        interface: python-can interface of the bus.
-        name: channel name of the bus in records.
+        bus: open bus of python-can. No other code may read from it.
+        interface: name of the python-can interface.
+        name: name of the bus in the records.
 
     Attributes:
-        reads: reader of the bus, which also counts frames that the driver could not read.
+        reads: object that reads single frames, and counts frames that the driver could not read.
         lost: number of lost frames, which is 0 because python-can does not report it.
         tally: counts of items that are not frames.
-        stepped: whether virtual time passes while the bus is read.
+        stepped: whether virtual time passes only while the bus is read.
     """
 
     def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:
@@ -231,14 +233,14 @@ def _reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
 
 
 class OpenBus:
-    """A bus that a SOURCE word and options name. The bus can be opened again.
+    """A CAN bus that was opened from a SOURCE word and options, and can be opened again later.
 
     Args:
         word: SOURCE word of the bus.
         options: options of the bus on the command line.
 
     Attributes:
-        bus: bus that was opened last.
+        bus: open bus of python-can, which a new opening replaces.
         name: name of the bus.
 
     Raises:
@@ -266,10 +268,10 @@ class OpenBus:
 
 
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
-    """Return the options of a bus. Options in the SOURCE word override the other options.
+    """Return the options of a bus after the SOURCE word is applied, which overrides other options.
 
-    With -i, the whole word is the channel, including colons, unless the word begins with that
-    interface.
+    If `-i` names the interface, the whole word is the channel, including colons, unless the word
+    begins with that interface.
 
     Raises:
         Refused: the word and -c name different channels.
@@ -306,12 +308,12 @@ _SEND_TIMEOUT_S: Final = 1
 
 
 class Transmitter:
-    """An open bus for sending frames.
+    """An open CAN bus that a command sends frames on, such as `canmon send`.
 
     Args:
-        word: SOURCE word of the bus, or None if the options name the bus.
+        word: SOURCE word that names the bus, or None if the options name it.
         options: options of the bus on the command line.
-        receives: whether to read received frames. Otherwise they are discarded.
+        receives: whether received frames are kept for `poll`. Otherwise, they are discarded.
 
     Attributes:
         name: name of the bus.
@@ -336,13 +338,17 @@ class Transmitter:
             self._reads = reader.reads if isinstance(reader, BusReader) else None
 
     def send(self, frame: CanFrame | FdFrame) -> None:
-        """Send a frame. Raise SourceFailed if the bus is gone, blocked for 1 s, or lacks CAN FD."""
+        """Send a frame.
+
+        Raises:
+            SourceFailed: the bus is gone, was blocked for 1 s, or does not support CAN FD.
+        """
         if isinstance(frame, FdFrame) and not self._takes_fd:
             raise SourceFailed(f"cannot send {frame} on {self.name}: CAN FD wants --fd")
         send_on(self._bus, self.name, frame)
 
     def poll(self, timeout_us: int) -> list[Record]:
-        """Wait for a first frame. Return all frames that have arrived.
+        """Wait at most `timeout_us` for a frame, and return all frames that have arrived.
 
         Raises:
             SourceFailed: the bus is gone.
@@ -370,7 +376,16 @@ class Transmitter:
 
 
 def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
-    """Send a frame on the named bus. Raise SourceFailed if the bus is gone or blocked for 1 s."""
+    """Send a frame on a bus of python-can.
+
+    Args:
+        bus: open bus.
+        name: name of the bus for the error message.
+        frame: frame to send.
+
+    Raises:
+        SourceFailed: the bus is gone, or it was blocked for 1 s.
+    """
     try:
         bus.send(to_message(frame), _SEND_TIMEOUT_S)
     except Exception as error:  # drivers raise what they like

@@ -47,11 +47,13 @@ _UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PRO
 
 
 class RtcLiteLine:
-    """Decoder of both directions of a line to an RTC-Lite device, for bytes in chunks of any size.
+    """Decoder of the traffic between a host and an RTC-Lite device on a serial line.
+
+    Both directions are decoded. The bytes may arrive in chunks of any size.
 
     Args:
-        channel: name of the line.
-        checksum: checksum algorithm of the frames.
+        channel: name of the line in the records.
+        checksum: checksum algorithm of the protocol frames.
     """
 
     def __init__(self, channel: str, checksum: Checksum = Checksum.SUM8) -> None:
@@ -151,10 +153,12 @@ _KIND: Final = "rrc"
 
 
 class RrcLines:
-    """Decoder of both directions of a line to an RRC, for bytes in chunks of any size.
+    """Decoder of the traffic between a host and an RRC on a serial line.
+
+    Both directions are decoded. The bytes may arrive in chunks of any size.
 
     Args:
-        channel: name of the line.
+        channel: name of the line in the records.
     """
 
     def __init__(self, channel: str) -> None:
@@ -235,17 +239,18 @@ _DECODINGS: Final[dict[str, _Decoding]] = {
 
 
 class LineReader:
-    """Reader of one serial port. It sends nothing.
+    """Reader that listens on one serial port and decodes the messages. It sends nothing.
 
     Args:
-        word: port, protocol and direction as in a SOURCE word.
+        word: parsed SOURCE word with the port, the protocol and the direction.
 
     Attributes:
         name: name of the port.
-        lost: number of lost bytes, which is 0 because a serial port does not report it.
-        tally: counts of items, always empty because invalid bytes are reported as lines.
-        stepped: whether virtual time passes while the port is read, which is False because its time
-            is real time.
+        lost: number of lost bytes, which is always 0 because a serial port does not report lost
+            bytes.
+        tally: counts of items that are not messages, always empty because invalid bytes are
+            returned as messages.
+        stepped: whether virtual time passes only while the port is read, which is always False.
 
     Raises:
         LinkClosed: the port cannot be opened.
@@ -259,9 +264,10 @@ class LineReader:
         self._link = SerialLink(word.port, word.baud or usual_baud)
 
     def read(self, timeout_us: int, /) -> list[LineRecord]:
-        """Wait for a first byte.
+        """Wait at most `timeout_us` for a first byte. Return the messages that are now complete.
 
-        Return the complete lines. Raise LinkClosed if the port is gone.
+        Raises:
+            LinkClosed: the port is gone.
         """
         data = self._link.receive(timeout_us)
         at_us = time.time_ns() // 1_000

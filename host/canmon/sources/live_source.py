@@ -33,13 +33,13 @@ _Read_co = TypeVar("_Read_co", bound="Record | LineRecord", covariant=True)
 
 
 class Reader(Protocol[_Read_co]):
-    """Reader of an open bus or serial port.
+    """Reader of one open bus or serial port, which a `LiveSource` combines with others.
 
     Attributes:
         name: name of the bus or port.
         tally: counts of items that are not frames.
-        stepped: whether virtual time passes while the bus is read. Such a bus belongs to the thread
-            that opened it.
+        stepped: whether virtual time passes only while the bus is read. Such a bus may be read only
+            by the thread that opened it.
     """
 
     name: str
@@ -51,9 +51,12 @@ class Reader(Protocol[_Read_co]):
         """Number of frames that the driver reports as dropped."""
 
     def read(self, timeout_us: int, /) -> Sequence[_Read_co | Mark]:
-        """Wait for frames, and return them. Raise LinkClosed if the bus is gone.
+        """Wait at most `timeout_us` for a first frame, and return the frames that have arrived.
 
         A mark at the beginning of the result means that the bus went away or is back.
+
+        Raises:
+            LinkClosed: the bus is gone.
         """
 
     def close(self) -> None:
@@ -61,18 +64,19 @@ class Reader(Protocol[_Read_co]):
 
 
 class LiveSource(AnySource[_Item]):
-    """One or more buses or serial ports, each of which a thread reads.
+    """Source of frames from one or more buses or serial ports. A thread reads each of them.
 
-    Frames that the caller has not fetched are kept up to a limit. Further frames are lost, and
-    counted. The caller itself reads a bus in virtual time, because time passes while it polls.
+    Frames wait in a queue of limited size until the caller fetches them. If the queue is full,
+    further frames are lost and counted. A bus in virtual time has no thread: the caller itself
+    reads it, because time passes while it polls.
 
     Args:
-        readers: readers of open buses and ports.
+        readers: readers of the open buses and ports.
         chosen: filter for the frames of each reader, or None for all frames.
-        queue_frames: maximum number of frames that are kept.
+        queue_frames: maximum number of frames in the queue.
 
     Attributes:
-        failed: reason why a bus is gone.
+        failed: reason why a bus is gone, empty for none.
     """
 
     live = True
@@ -119,7 +123,7 @@ class LiveSource(AnySource[_Item]):
             one.wanted = True
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
-        """Return the counts of items that are not frames, by the name of each bus or port."""
+        """Return the counts of items that are not frames, for each bus or port with its name."""
         return [(reader.name, reader.tally) for reader in self._readers]
 
     @property
@@ -128,7 +132,10 @@ class LiveSource(AnySource[_Item]):
         return self._overruns + sum(reader.lost for reader in self._readers)
 
     def poll(self, timeout_us: int, /) -> list[_Item]:
-        """Wait for a first frame. Return all frames that have arrived, up to a mark."""
+        """Wait at most `timeout_us` for a first frame.
+
+        Return all frames that have arrived, up to the next mark.
+        """
         self.marks = ()
         for reader, chosen in self._stepped:
             self._take(reader, chosen, timeout_us)
@@ -266,7 +273,9 @@ class ReopeningReader(Generic[_Item]):
         return self._gone_us is not None
 
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
-        """Wait for frames, and return them, with marks when the bus goes away and when it is back.
+        """Wait at most `timeout_us` for a first frame, and return the frames that have arrived.
+
+        Marks in the result report that the bus went away, or that it is back.
 
         Raises:
             LinkClosed: the bus is gone, and `wanted` is not set.

@@ -55,14 +55,15 @@ _Taken_co = TypeVar("_Taken_co", covariant=True)
 
 
 class AnySource(Generic[_Taken_co]):
-    """A source of frames, or of lines of a serial port, as they arrive.
+    """A source from which a command reads frames, or messages of a serial line, with `poll`.
 
     Attributes:
-        live: whether new data arrive with time, or False if all data exist already.
-        failed: reason why the source ended early, empty if it did not.
-        marks: events after the frames that `poll` returned last.
-        recorded: whether a recorder wrote these marks and has already reported them.
-        buses: buses to send on, by name.
+        live: whether frames arrive as time passes, as from a bus. False means that all frames exist
+            already, as in a log.
+        failed: reason why the source ended early, empty for none.
+        marks: events after the frames that the last `poll` returned.
+        recorded: whether a recorder wrote these marks into a log and has already reported them.
+        buses: open buses of the source by name, on which frames can be sent.
     """
 
     live = recorded = False
@@ -91,12 +92,12 @@ class AnySource(Generic[_Taken_co]):
         """Open buses that go away again. A source with an end is not affected."""
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
-        """Return the counts of items that are not frames, by the name of each bus or file."""
+        """Return the counts of items that are not frames, for each bus or file with its name."""
         return ()
 
     @property
     def lost(self) -> int:
-        """Number of frames that were lost before they were read, as far as this is reported."""
+        """Number of frames that were lost before they were read, if the bus or log reports this."""
         return sum(tally.lost for _, tally in self.tallies())
 
     @property
@@ -123,7 +124,10 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether there were frames, but filters of SOURCE words or a cut removed all of them."""
+        """Whether the source has frames, but none passed its filters.
+
+        Filters are those of SOURCE words, and the wanted part of a log.
+        """
         return self._cut is not None and self._cut.empty
 
     @property
@@ -170,13 +174,14 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A bus, with a filter for its frames. The options define the attributes that are None.
+    """A CAN bus as a SOURCE word names it, with a filter for its frames.
 
-    A bus with a data bit rate is a CAN FD bus.
+    Attributes that are None are taken from the options of the command. If there is a data bit rate,
+    the bus is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon. This text is part of the channel if -i names the
-            interface.
+        prefix: text before the first colon of the word. If `-i` names the interface, this text is
+            part of the channel.
     """
 
     interface: str | None = None
@@ -189,13 +194,14 @@ class BusSpec:
 
 @dataclass(frozen=True, slots=True)
 class LineSpec:
-    """A serial port, with the protocol of its line.
+    """A serial port as a SOURCE word names it, with the protocol of its line.
 
     Attributes:
         port: device name or pyserial URL of the port.
-        baud: baud rate in bit/s, or None for the usual rate of the protocol.
+        baud: baud rate in bit/s, or None for the default of the protocol.
         protocol: protocol of the line, one of `_PROTOCOLS`.
-        from_host: whether the received data are the data that the host sends.
+        from_host: whether the port receives what the host sends. Otherwise, it receives what the
+            device sends.
     """
 
     port: str
@@ -205,10 +211,12 @@ class LineSpec:
 
 
 def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
-    """Read a SOURCE word. Return None for standard input.
+    """Parse a SOURCE word of the command line: a log file, a CAN bus, or a serial port.
+
+    The result is None for `-`, which means standard input.
 
     Raises:
-        Refused: the word is not a SOURCE.
+        Refused: the word has none of these forms.
     """
     if word == "-":
         return None
@@ -267,11 +275,13 @@ def _chosen(filters: str) -> CandumpFilter | None:
 
 @dataclass(frozen=True, slots=True)
 class LogCut:
-    """The wanted part of a log. By default, it is the whole log.
+    """The part of a log that a command reads, from `--from` and `--to`.
+
+    By default, it is the whole log.
 
     Attributes:
-        begin: start of the part, or None for the first frame of the log.
-        end: end of the part, or None for the last frame of the log.
+        begin: first moment of the part, or None for the beginning of the log.
+        end: last moment of the part, or None for the end of the log.
         earlier: function that is called with each frame before the part, so that a decoder can
             learn from it.
     """
@@ -367,7 +377,10 @@ class _CutLog:
         return self._origin_us is not None and not self._passed
 
     def messages(self) -> list[str]:
-        """Report an empty part with the range of the log, or nothing if the part is not empty."""
+        """Return a message if the wanted part has no frames.
+
+        The message gives the time range of the log.
+        """
         if not self.empty:
             return []
         span_s = (self._last_us - self._first_us) / 1e6
@@ -409,7 +422,10 @@ class _LoggedSource(AnySource[Record]):
         return []
 
     def poll(self, timeout_us: int, /) -> list[Record]:
-        """Return the next frames up to a mark. For a pipe, wait for some frames."""
+        """Return the next frames of the log, up to the next mark.
+
+        If the log comes through a pipe, the method waits for some frames.
+        """
         if self._ended:
             self.marks = ()
             return []
@@ -549,10 +565,12 @@ SMALL_BYTES: Final = 1 << 20
 
 
 class BlockLog(AnySource["Columns"]):
-    """A log file as columns, with one block for each poll. Only one block is in memory.
+    """Source that reads a log file in blocks of columns, which is faster than frame by frame.
+
+    Each `poll` returns one block, and only one block is in memory.
 
     Attributes:
-        no_columns: whether reading ended early because the file must be read frame by frame.
+        no_columns: whether reading ended early, because this log must be read frame by frame.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -589,7 +607,9 @@ class BlockLog(AnySource["Columns"]):
 
 
 class PieceLog(_LoggedSource):
-    """A log file in pieces, as columns if possible, or else as frames up to the next marks.
+    """Source that reads a log file in pieces: as columns if possible, otherwise as frames.
+
+    A piece of frames ends at the next marks.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -606,7 +626,10 @@ class PieceLog(_LoggedSource):
         return [(str(self._path), self._reader.tally)]
 
     def pieces(self) -> Iterator[Columns | Sequence[Record]]:
-        """Yield the file in pieces. After each piece, `lost` and `marks` apply to its end."""
+        """Yield the pieces of the file.
+
+        After each piece, `lost` and `marks` are those at its end.
+        """
         ahead: Columns | Sequence[Item] | None = ()
         while not self._ended:
             if not self._items:
@@ -637,12 +660,14 @@ class PieceLog(_LoggedSource):
 
 
 def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
-    """Open the log that SOURCE words name. Return None if it should be read frame by frame.
+    """Open a log for reading in blocks of columns.
+
+    The result is None if the SOURCE words name something else, or if the log should be read frame
+    by frame.
 
     Args:
         words: SOURCE words.
-        cut: wanted part of the log. If its `earlier` takes frames before the part, the result is
-            None.
+        cut: wanted part of the log. If it passes earlier frames to a decoder, the result is None.
 
     Raises:
         Refused: the words do not name a source.
@@ -674,7 +699,10 @@ def _large_log(words: Sequence[str], cut: LogCut) -> Path | None:
 def open_source(
     words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
 ) -> Source:
-    """Open the source that SOURCE words name as `open_any` does, without serial ports."""
+    """Open the source that SOURCE words name, for a command that reads only CAN frames.
+
+    The function is `open_any` without serial ports.
+    """
     source = open_any(words, options or BusOptions(), cut, lines_too=False)
     return cast("Source", source)  # without lines: frames
 
@@ -684,13 +712,13 @@ def open_any(
 ) -> AnySource[AnyRecord]:
     """Open the source that SOURCE words name: buses and serial ports, files, or standard input.
 
-    Files are merged by time. Buses and serial ports are read as frames and lines arrive.
+    Several files are merged by time. Buses and serial ports are read as frames and messages arrive.
 
     Args:
-        words: SOURCE words. Without words, the options name a bus.
+        words: SOURCE words of the command. Without words, the options name a bus.
         options: interface, bit rate and other options of the buses.
-        cut: wanted part of the files or of standard input. With a part, a bus is refused.
-        lines_too: whether the source may be a serial port.
+        cut: wanted part of the files or of standard input. A part of a bus is refused.
+        lines_too: whether serial ports are allowed.
 
     Raises:
         Refused: the words do not name a source, or the sources cannot be combined.

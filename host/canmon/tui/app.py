@@ -63,15 +63,17 @@ _Light = tuple[str, str]
 
 
 class RecorderTask(Task):
-    """Recorder that writes in parts, so that no earlier file is overwritten.
+    """The recorder of the monitor, which writes all frames of the session into log files.
+
+    The log is written in parts, so that no earlier file is overwritten.
 
     Args:
-        session: session with the source of the traffic.
+        session: session that supplies the frames.
 
     Attributes:
         section: name of the recorder's table in the workspace.
-        words: arguments of the recording, as for `canmon dump -l`.
-        recorder: current or last recorder, or None before the first recorder.
+        words: text of the recording's settings, with the same arguments as for `canmon dump -l`.
+        recorder: present or last recorder, or None before the first recording.
     """
 
     section: Final = "record"
@@ -99,10 +101,11 @@ class RecorderTask(Task):
         return "" if self.recorder is None else self.recorder.failed
 
     def start(self, words: str) -> None:
-        """Begin a recording. From now on, buses that go away are opened again.
+        """Start a recording. From then on, a bus that goes away is opened again.
 
         Raises:
-            ValueError: the words do not name a recording, or the recording cannot be written.
+            ValueError: the words are not valid arguments of a recording, or a file cannot be
+                written.
         """
         session = self._session
         self.end()
@@ -181,7 +184,9 @@ _ALARM: Final = "bold red"
 
 
 class StatusLine(Widget):
-    """A line that shows the status. A click on its first word arms or disarms.
+    """The status line of the monitor: armed or not, buses with load, counts, and faults.
+
+    A click on the first word arms or disarms the session, which allows or stops sending.
 
     Args:
         session: the session whose status it shows.
@@ -380,17 +385,19 @@ _SWITCH_S: Final = 0.002
 
 
 class MonitorApp(FramedApp):
-    """The monitor app with tabs, keys, help and the status line.
+    """The Textual app of `canmon tui`: tabs, keys, help and the status line.
 
     Args:
-        session: session with the traffic and the buses to send on. The caller of the app starts it.
-        panels: panels that are the tabs.
-        panel_settings: storage of the panels' settings. None stores the settings only on export.
-        recorder: recorder of the monitor. By default, it is a new recorder.
+        session: session with the traffic and the buses to send on. The caller of the app starts the
+            session.
+        panels: panels, each of which is one tab.
+        panel_settings: storage of the panels' settings. None means that settings are stored only on
+            export.
+        recorder: recorder of the monitor. By default, a new recorder is used.
 
     Attributes:
-        reopens: whether buses that go away are opened again.
-        asks: whether the app begins with the settings screen, because no source was named.
+        reopens: whether a bus that goes away is opened again.
+        asks: whether the app begins with the settings screen, because the user named no source.
     """
 
     TITLE = "canmon"
@@ -729,7 +736,10 @@ class MonitorApp(FramedApp):
         self.recorder.trigger()
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Yield the tabs, and the keys of the frame and of the visible panel, by name."""
+        """Yield the entries of Textual's command palette: the tabs, and the keys that are shown.
+
+        The keys are those of the app and of the visible panel.
+        """
         yield from super().get_system_commands(screen)
         for number, panel in enumerate(self.panels, 1):
             yield SystemCommand(panel.title, f"show tab {number}", partial(self.action_tab, number))

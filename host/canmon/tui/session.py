@@ -134,25 +134,27 @@ _Send = Callable[[CanFrame | FdFrame], None]
 
 
 class Task(Protocol):
-    """A task that receives all frames, and may send frames. The session's thread calls the task.
+    """An activity of the monitor that receives all frames, and may send frames.
+
+    The thread of the session calls the task.
 
     Attributes:
-        channel: bus on which the task sends, empty for the first bus.
+        channel: name of the bus on which the task sends, empty for the first bus.
     """
 
     channel: str = ""
 
     @property
     def due_us(self) -> int:
-        """Time at which the next call is due, even if no frame arrives, or `NEVER`."""
+        """Time at which the session calls the task next, even if no frame arrives, or `NEVER`."""
         return NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
-        """Process records, including frames of this program. Return the frames to send.
+        """Process new frames, and return the frames to send.
 
         Args:
-            now_us: time of the session, which is not the time of the frames.
-            records: frames since the last call.
+            now_us: present time of the session, which is not the clock of the frames' time stamps.
+            records: frames since the last call, including frames that this program sent.
         """
 
     def stop(self) -> None:
@@ -215,7 +217,10 @@ class Session:
 
     @property
     def silent(self) -> bool:
-        """Whether no frame arrived on a bus for some seconds after the bus was opened."""
+        """Whether no frame has arrived for some seconds since a bus was opened.
+
+        The trace tab then shows a hint.
+        """
         waited_us = self._clock() - self._begun_us
         return self.source.live and not self.model.frames and waited_us > _SILENT_US
 
@@ -236,7 +241,10 @@ class Session:
         return self.model.trace.origin_us or 0
 
     def next_stamp(self) -> None:
-        """Use the next format of times: since the first frame, since the previous one, absolute."""
+        """Switch to the next format of displayed times.
+
+        The formats are: since the first frame, since the previous frame, absolute.
+        """
         self.stamp = STAMPS[(STAMPS.index(self.stamp) + 1) % len(STAMPS)]
 
     def next_bus(self, bus: str) -> str:
@@ -263,7 +271,10 @@ class Session:
         return self._thread is not None
 
     def over(self, model: Model) -> Session:
-        """Return a new session with another model on the same source. Close this session first."""
+        """Return a new session that reads the same source into another model.
+
+        This session must be closed first.
+        """
         session = Session(self.source, model, self.buses, self._clock)
         session.words = self.words
         return session
@@ -296,7 +307,11 @@ class Session:
         self._pool.shutdown()
 
     def step(self, timeout_us: int = 0) -> None:
-        """Wait for a first frame or a due task. Process all frames that have arrived."""
+        """Wait for a frame or a due task, then process all frames that have arrived.
+
+        The tasks process the frames, too, and the frames that they return are sent. `timeout_us` is
+        the longest time to wait.
+        """
         due_us = min((task.due_us for task in self.tasks), default=NEVER)
         records = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
         with self.lock:
@@ -359,7 +374,9 @@ _TERMINAL: Final = "/dev/tty"
 
 
 def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Session:
-    """Open the source that SOURCE words name. Nothing is sent until the session is armed.
+    """Open the source that SOURCE words name, and return a session of the monitor that reads it.
+
+    Nothing is sent until the user arms the session.
 
     Raises:
         Refused: the words do not name a source, or the sources cannot be combined.

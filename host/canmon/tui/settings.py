@@ -84,12 +84,12 @@ class InputError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MonitorSettings:
-    """The settings that the screen can change.
+    """The settings that the user can change on the settings screen of the monitor.
 
     Attributes:
-        setup: buses and files of the monitor.
-        filter: filter of the trace.
-        rules: rules of the alarms as TOML.
+        setup: sources and files of the monitor.
+        filter: filter expression of the trace tab.
+        rules: rules of the alarms as TOML text.
     """
 
     setup: MonitorSetup
@@ -135,14 +135,14 @@ def setting_texts(settings: MonitorSettings) -> dict[str, str]:
 
 
 def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None) -> MonitorSettings:
-    """Parse the texts of the fields.
+    """Parse the texts that the user entered into the fields of the settings screen.
 
     Args:
-        texts: texts of all fields.
-        before: present settings. Options that have no field are kept.
+        texts: text of each field by its name.
+        before: present settings. Their options without a field are kept.
 
     Raises:
-        InputError: a field is invalid.
+        InputError: the text of a field is invalid.
     """
     words = {name: _words(name, texts[name]) for name in (*_PATHS, "bus_kwargs")}
     with of_field("source"):
@@ -200,19 +200,19 @@ class _FileSuggester(Suggester):
     """
 
     async def get_suggestion(self, value: str) -> str | None:
-        """Return the text of the field with the first file name that has this beginning."""
+        """Return the text of the field, completed with the first file name that fits."""
         begun = value.rpartition(" ")[2]
         found = list(islice(iglob(f"{escape(begun)}*"), 100)) if begun else []
         return f"{value}{min(found)[len(begun) :]}" if found else None
 
 
 class SettingsScreen(ModalScreen[None]):
-    """All fields, with an error message below each invalid one.
+    """The settings screen of the monitor, with an error message below each invalid field.
 
     Args:
         settings: the present settings.
-        apply: function that is called with the entered settings. It raises InputError if the
-            settings cannot be used.
+        apply: function that is called with the entered settings. It raises InputError if they
+            cannot be used.
     """
 
     HELP = """

@@ -93,7 +93,7 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count frames. The first call may set the origin of displayed times.
+        """Count checked frames. The first call may determine the time that is displayed as 0.
 
         Args:
             frames: frames to count. There is at least one frame.
@@ -129,9 +129,9 @@ class _FindingPrinter:
 
     @property
     def none_judged(self) -> dict[str, str]:
-        """Reasons why rules judged nothing, by name of the rule.
+        """Reasons why rules could not judge any frame, by name of the rule.
 
-        A rule with a finding has judged.
+        A rule with a finding is not included.
         """
         return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
 

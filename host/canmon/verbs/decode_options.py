@@ -35,11 +35,11 @@ else:  # slow
 
 
 class EdsOptions(NamedTuple):
-    """The values of `--eds` and `--eds-dir`.
+    """The values of the options `--eds` and `--eds-dir` of a command.
 
     Attributes:
-        words: words of the form NODE=FILE.
-        folders: folders in which the files of other nodes are searched.
+        words: values of `--eds`, each of the form NODE=FILE.
+        folders: folders in which EDS files of other nodes are searched.
     """
 
     words: tuple[str, ...] = ()
@@ -90,9 +90,12 @@ filter_option: Final = click.option(
 
 
 def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
-    """Read the files of `--eds`. Raise Refused if a node, file or folder is missing or invalid.
+    """Read the EDS files that the options `--eds` and `--eds-dir` name.
 
-    Files of a folder are chosen when a node sends its identity, and each choice is reported.
+    A file in a folder is chosen when a node sends its identity, and each choice is reported.
+
+    Raises:
+        Refused: a node, file or folder is missing or invalid.
     """
     return eds_document.read_eds_paths(
         eds_document.eds_paths(eds.words), eds.folders, _say_beside_pictures
@@ -109,12 +112,16 @@ def _say_beside_pictures(text: str) -> None:
 
 
 def make_decoder(eds: EdsOptions = _NO_EDS, dbc: Sequence[Path] = ()) -> Decoder:
-    """Make a decoder from the files of `--eds` and `--dbc`. Raise Refused if a file is invalid."""
+    """Make the decoder of a command from the files that `--eds`, `--eds-dir` and `--dbc` name.
+
+    Raises:
+        Refused: a file is invalid.
+    """
     return decoder_of(read_eds_files(eds), dbc)
 
 
 def decoder_of(objects: Mapping[int, node_memory.EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
-    """Make a decoder from the EDS files that were read, and from the files of `--dbc`."""
+    """Make the decoder of a command from EDS files that were read already, and from DBC files."""
     with refusing_dbc():
         return extensions.make_decoder(objects, dbc)
 
@@ -127,7 +134,11 @@ def refusing_dbc() -> Iterator[None]:
 
 
 def read_filter(text: str | None) -> filters.Filter | None:
-    """Read the filter of `-F`. Raise Refused with the column if it is not a filter."""
+    """Parse the filter expression of the option `-F`, or return None if the option is not given.
+
+    Raises:
+        Refused: the text is not a filter. The message names the column of the mistake.
+    """
     if text is None:
         return None
     with refusing("", filters.FilterError):
@@ -184,7 +195,7 @@ def log_time_option(option: str, name: str, **attributes: Any) -> Decorator:
 
 
 def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.Command]:
-    """Return a decorator that makes a verb with SOURCE words, `--strict` and the bus options.
+    """Return a decorator that makes a command with SOURCE words, `--strict` and the bus options.
 
     Args:
         options: further options of the verb, in the order of the help.
@@ -204,7 +215,11 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
 
 
 def refuse_idle_of_bus(source: Sequence[str]) -> None:
-    """Raise Refused if options for a bus are given, but the SOURCE words name no bus."""
+    """Check that bus options are given only if the SOURCE words name a bus.
+
+    Raises:
+        Refused: an option for a bus has no effect on this source.
+    """
     words = [word for word in source if not word.endswith(".toml")]
     parsed = [parse_source(word) for word in words]
     if not parsed:

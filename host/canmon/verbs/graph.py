@@ -97,10 +97,10 @@ class _GraphRequest:
     title: str
 
     def view(self, series: Sequence[Series], first_us: int | None) -> View:
-        """Return the view. Raise Refused if it is invalid.
+        """Return the part of the curves to draw. Raise Refused if the options for it are invalid.
 
         Args:
-            series: samples of the curves.
+            series: samples of each curve.
             first_us: time of the first frame, from which times count.
         """
         whole = View.of(series)

@@ -64,10 +64,10 @@ _TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV, LogFormat.GVR
 
 
 def read_head(path: Path) -> _LogHead:
-    """Read the first thousand frames of a log, and the end of a text log.
+    """Read the first thousand frames of a log, and the end of a text log, for `canmon info`.
 
     Raises:
-        LogFormatError: the name of the file has no known format.
+        LogFormatError: the name of the file indicates no format.
         OSError: the file cannot be read.
         LogError: the content does not match the name of the file.
     """

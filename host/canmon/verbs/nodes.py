@@ -118,7 +118,7 @@ class _NodesView:
         self._watch.take(records)
 
     def lines(self, *, live: bool) -> list[str]:
-        """Return the board as lines that fit the terminal, or have full width for a file."""
+        """Return the table of nodes as lines that fit the terminal, or of full width for a file."""
         columns = _columns() if sys.stdout.isatty() else _MANY
         return render_board(self._board, self._now_us(live), columns, _MANY)
 

@@ -133,12 +133,13 @@ _EXACT_US: Final = 100_000
 
 
 class Lateness:
-    """Statistics of delays.
+    """Statistics of how late the frames of a replay were sent.
 
     Attributes:
-        count: number of delays.
-        max_us: longest delay.
-        last_us: latest delay. At the end of a replay, it is the drift of the replay.
+        count: number of frames that were counted.
+        max_us: longest delay in microseconds.
+        last_us: latest delay in microseconds. At the end of a replay, it shows how far the replay
+            has drifted.
     """
 
     def __init__(self) -> None:
@@ -154,7 +155,10 @@ class Lateness:
         self._counts[late_us if exact else max(_EXACT_US, middle_us(bucket_of(late_us)))] += 1
 
     def percentile_us(self, percent: float) -> int:
-        """Return the delay that a percentage, 0 to 100, does not exceed, or 0 without delays."""
+        """Return a percentile of the delays in microseconds, or 0 if nothing was counted.
+
+        `percent` is 0 to 100. This percentage of the delays is not longer than the result.
+        """
         left = self.count * percent / 100
         for late_us, count in sorted(self._counts.items()):
             left -= count

@@ -41,7 +41,7 @@ else:  # python-can is slow
 
 
 class ConditionDecoder:
-    """Decoder of all frames, used for conditions on frames.
+    """Decoder of received frames for a sequence whose conditions are filter expressions.
 
     Attributes:
         eds: content of EDS files by node-ID.
@@ -56,9 +56,10 @@ class ConditionDecoder:
         self._latest.take(record, self._decoder.take(record))
 
     def condition(self, text: str) -> FrameCondition:
-        """Return the condition of a filter expression.
+        """Parse a filter expression, and return a condition that tests the latest decoded frame.
 
-        Raise ValueError if the text is not a filter.
+        Raises:
+            ValueError: the text is not a filter.
         """
         return self._latest.condition(text)
 

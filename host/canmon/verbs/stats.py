@@ -133,7 +133,10 @@ def _node_cells(row: _NodeRow, bus: BusRow) -> list[str]:
 
 
 def bus_json(bus: BusRow, bit_rate: int | None) -> str:
-    """Return a bus as JSON. Loads are shares of the bit rate, or null if it is unknown."""
+    """Return the statistics of a bus as one line of JSON, for `canmon stats --jsonl`.
+
+    Loads are shares of the bit rate, or null if the bit rate is unknown.
+    """
     load, errors = bus.load, bus.errors
     return _line(
         "bus",

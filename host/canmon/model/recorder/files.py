@@ -491,7 +491,7 @@ class Files:
 
     Attributes:
         frames: number of frames that were stored.
-        parts: number of files that were begun.
+        parts: number of files that were started.
         removed: number of files that were removed to stay within the limits.
         ended: reason why writing ended, empty if writing continues.
 

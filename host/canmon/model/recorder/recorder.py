@@ -333,10 +333,10 @@ class Recorder:
     def take_block(self, block: TextBlock, now_us: int) -> bool:
         """Record many frames at once.
 
-        Return False if the caller must pass them to `take` one by one.
+        The result is False if the caller must pass the frames to `take` one by one.
 
         Args:
-            block: at least one frame, with no event after the frames.
+            block: block of at least one frame, with no event after the frames.
             now_us: current time.
         """
         whole = self._before is None and self._wanted is None

@@ -29,13 +29,15 @@ _LOOK_US: Final = 100_000
 
 
 class AlarmTask(Task):
-    """Task that checks frames, and detects missing frames. It sends nothing.
+    """Task that checks all frames with the rules of the alarms, and detects missing frames.
+
+    The task sends nothing.
 
     Args:
-        model: model with the time of the source and the number of lost frames.
+        model: model of the session, with the time of the source and the number of lost frames.
 
     Attributes:
-        alarms: alarms with the state of the rules.
+        alarms: evaluation of the rules, with the state of each rule.
     """
 
     def __init__(self, model: Model) -> None:
@@ -54,9 +56,10 @@ class AlarmTask(Task):
         return self._due_us
 
     def hold(self, rules: Rules) -> None:
-        """Check other rules from now on.
+        """Replace the rules that frames are checked with, and restart the check.
 
-        Raise ValueError for a limit of the load without a bit rate.
+        Raises:
+            ValueError: a rule limits the load, but the bit rate of the bus is unknown.
         """
         self.alarms = Alarms(rules, self.bit_rate, self._model.top.rates.fast)
         self._due_us = NEVER if rules == Rules() else 0
@@ -124,7 +127,7 @@ class AlarmsPanel(Panel):
         self.set_interval(_BADGE_S, self.refresh_badge)
 
     def refresh_badge(self) -> None:
-        """Mark the title of the tab while a rule is broken, until the user acknowledges it."""
+        """Mark the title of the tab if a rule is broken, until the user acknowledges the alarm."""
         now_us = self.session.model.now_us
         with self.session.lock:
             states = {alarm.state(now_us) for alarm in self.held.alarms.rows()}
@@ -176,7 +179,10 @@ class AlarmsPanel(Panel):
         return self._targets[number] if number < len(self._targets) else None
 
     def action_frame(self) -> None:
-        """Show the frame of the chosen finding, or the latest finding of a rule, in the trace."""
+        """Show the frame of a finding in the trace tab.
+
+        The finding is the chosen one, or the latest finding of the chosen rule.
+        """
         finding = self._target(self.query_one(ChoiceView).chosen)
         if finding is None:
             self.notify("choose a finding: the arrows do")

@@ -41,9 +41,10 @@ _WATCH_US: Final = 1_000_000
 
 
 class DictionaryTask(Task):
-    """A client of the default SDO server of one node at a time (1200h).
+    """Task that reads and writes objects of a node with its default SDO server (1200h).
 
-    The displayed values come only from the traffic, including answers to other clients.
+    The task communicates with one node at a time. The displayed values come only from the traffic,
+    so answers to other clients count, too.
 
     Args:
         decoder: decoder that knows the objects of the nodes.
@@ -99,10 +100,7 @@ class DictionaryTask(Task):
         self._start(now_us, f"write {write_entry(entry)}", download(*entry, data))
 
     def watch(self, now_us: int, entry: Entry) -> None:
-        """Read an object of the chosen node each second.
-
-        If the object is watched already, stop watching it.
-        """
+        """Read an object of the chosen node each second, or stop this if it is read already."""
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER
 

@@ -33,10 +33,10 @@ _COLOURS: Final = {
 
 
 class GraphTask(Task):
-    """Task that collects the values of signals. It sends nothing.
+    """Task that collects the values of the displayed signals from the frames. It sends nothing.
 
     Args:
-        graph: graph with the curves.
+        graph: graph that receives the values.
     """
 
     def __init__(self, graph: LiveGraph) -> None:
@@ -139,7 +139,7 @@ class GraphPanel(panel.Panel):
             self.query_one(panel.PromptLine).prompt("take out", self._texts[-1], self._remove)
 
     def action_graph(self, change: str, *arguments: Any) -> None:
-        """Change the view by a method of the graph, such as `zoom`, `move` or `fit`."""
+        """Call a method of the graph that changes the view, such as `zoom`, `move` or `fit`."""
         self.change(lambda: getattr(self.graph, change)(*arguments))
 
     def action_write(self) -> None:

@@ -65,11 +65,11 @@ class _BoardColumn(NamedTuple):
 
 
 def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) -> list[Line]:
-    """Return lines of text: a header, and a line for each node, as wide as the screen if possible.
+    """Return the table of all CANopen nodes as lines: a header, and a line for each node.
 
     Args:
-        rows: nodes of the board.
-        now_us: time to which ages refer.
+        rows: states of the nodes.
+        now_us: present time, from which ages are counted.
         width: number of columns of the screen.
     """
     several = len({row.channel for row in rows}) > 1
@@ -139,7 +139,7 @@ def _state(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
-    """Return the age of the heartbeat as numbers and as a bar that is full after a period."""
+    """Return the age of a node's heartbeat as text with a bar, which is full after one period."""
     age_us, period_us = row.age_us(now_us), row.heartbeats.period_us
     if age_us is None:
         return plain("never seen", BAD) if period_us else ()
@@ -205,14 +205,16 @@ def card_lines(
     stamp: Stamp = Stamp.ABSOLUTE,
     origin_us: int = 0,
 ) -> list[Line]:
-    """Return the data of one node, and the EMCYs of all nodes. The latest EMCY is first.
+    """Return the details of one CANopen node as lines, followed by the EMCY messages of all nodes.
+
+    The latest EMCY is first.
 
     Args:
-        row: node of the card.
-        rows: all nodes.
+        row: state of the node.
+        rows: states of all nodes.
         width: number of columns of the screen. A longer text continues on the next line.
-        stamp: format of times.
-        origin_us: time of the first frame.
+        stamp: format of displayed times.
+        origin_us: time of the first frame, from which times count.
     """
     name = node_board.name_text(row)
     where = f"{row.channel} node {row.node}" + f": {name}" * bool(name)
@@ -268,13 +270,16 @@ class _NodeTask(Task):
         return bool(self._asks)
 
     def scan(self, channel: str, now_us: int) -> None:
-        """Request the device type of all node-IDs of a bus, and the identity of the nodes found."""
+        """Search a bus for nodes with SDO.
+
+        The task reads the device type of all node-IDs, and the identity of the nodes found.
+        """
         self.channel, self._due_us = channel, now_us
         self._answered_ids.clear()
         self._asks = deque(_upload(node, *DEVICE_TYPE) for node in _NODE_IDS)
 
     def command(self, channel: str, node: int, command: NmtCommand) -> None:
-        """Send an NMT command to a node on a bus, or to all nodes with node-ID 0."""
+        """Send an NMT command to a node on a bus. Node-ID 0 means all nodes."""
         self.channel = channel
         self._out.append(CanFrame(NMT_COB_ID, bytes((command, node))))
 
@@ -430,7 +435,10 @@ class NodesPanel(Panel):
             panel.show_node((row.channel, row.node))
 
     def action_command(self, word: str, to_all: bool = False) -> None:
-        """Ask whether to send an NMT command to the chosen node, or to all nodes on its bus."""
+        """Ask the user for confirmation, then send an NMT command to the chosen node.
+
+        If `to_all` is set, the command is for all nodes on the bus of that node.
+        """
         row = self.chosen
         if row is None or not self.may_send():
             return

@@ -47,7 +47,7 @@ _CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
-    """A list of lines. The chosen line is shown in reverse video.
+    """A list of lines in a panel, of which the user chooses one. It is shown in reverse video.
 
     Attributes:
         chosen: number of the chosen line, from 0.
@@ -135,12 +135,12 @@ class PromptLine(Vertical):
         yield Static(id="wrong", markup=False)
 
     def prompt(self, question: str, answer: str, take: _Take) -> None:
-        """Ask the user for a text.
+        """Ask the user for a text, in a line of the panel.
 
         Args:
             question: text of the question.
-            answer: default answer.
-            take: function that is called with the answer.
+            answer: default answer, which the user can edit.
+            take: function that is called with the answer of the user.
         """
         if not self.display:
             self._back = self.screen.focused
@@ -172,7 +172,7 @@ class PromptLine(Vertical):
 
 
 class PictureView(LineView, inherit_bindings=False):
-    """A view of a picture. It has no keys, so that the panel receives all keys."""
+    """A widget that shows a picture. It has no keys, so that the panel receives all keys."""
 
     class Pointed(Message):
         """Message that the picture was clicked.
@@ -209,15 +209,15 @@ def ansi_line(text: str, styles: Mapping[str, str]) -> Line:
 
 
 def read_help(module: str) -> str:
-    """Return the help of a tab in Markdown, from a file beside the module of the tab."""
+    """Return the help text of a tab in Markdown, which is a file beside the module of the tab."""
     return Path(module).with_suffix(".md").read_text("utf-8")
 
 
 class FrameWanted(Message):
-    """A request to show a frame in the trace.
+    """A Textual message with which a panel asks the app to show a frame in the trace tab.
 
     Args:
-        at_us: time of the frame.
+        at_us: time of the frame in microseconds.
         record: frame to show, or None for the latest frame up to `at_us`.
     """
 
@@ -227,11 +227,11 @@ class FrameWanted(Message):
 
 
 class Panel(Vertical):
-    """A tab of the monitor.
+    """Base class of the tabs of the monitor `canmon tui`.
 
-    While the panel is visible, the app calls `refresh_view` ten times a second. The panel may call
-    `refresh_view` after a key. Keys are Textual `BINDINGS`, each with a description. `HELP` is
-    Markdown. F1 shows the keys and the help.
+    While the panel is visible, the app calls `refresh_view` ten times a second. The panel may also
+    call it after a key. A subclass defines its keys as Textual `BINDINGS`, each with a description,
+    and its help `HELP` in Markdown. F1 shows the keys and the help.
 
     A panel that needs every frame, or sends frames, adds a `Task` to `session.tasks` when it is
     created.
@@ -284,7 +284,7 @@ class Panel(Vertical):
         """Show the data of the snapshot while the panel is visible."""
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Apply settings of the workspace, before the panel is on a screen.
+        """Apply the settings of the panel from the workspace file, before the panel is on a screen.
 
         The method ignores unknown keys, which stay in the file.
 
@@ -293,18 +293,16 @@ class Panel(Vertical):
         """
 
     def save(self) -> dict[str, Any]:
-        """Return all settings of the panel as TOML values.
+        """Return the settings of the panel as TOML values, for the workspace file.
 
-        The values are tables, arrays, strings, numbers and booleans.
-
-        The app also calls this method while the panel is not on a screen. Do not read values from
-        widgets.
+        TOML values are tables, arrays, strings, numbers and booleans. The app also calls this
+        method while the panel is not on a screen, so the method must not read values from widgets.
         """
         return {}
 
 
 class SendingPanel(Panel):
-    """A tab that sends on one bus at a time.
+    """Base class of tabs that send frames, on one bus at a time that the user selects.
 
     Args:
         session: session with the traffic and the buses to send on.
@@ -356,7 +354,9 @@ TABS: Final = ExtensionGroup[type[Panel]](
 
 
 def make_panels(session: Session, notify: Callable[[str], None]) -> list[Panel]:
-    """Return all tabs. Tabs of other packages that cannot be created are left out.
+    """Create the tabs of the monitor, including tabs of other installed packages.
+
+    A tab of another package that cannot be created is left out.
 
     Args:
         session: session that the tabs show.

@@ -59,7 +59,11 @@ _NAME: Final = re.compile(r"""\s*(?:name\s*=\s*["'](.+?)["']|#\s*(.+?))\s*""")
 
 
 def sequence_name(text: str, number: int) -> str:
-    """Return the name of a sequence, which is its `name`, or a comment on its first line."""
+    """Return the name of a sequence for display.
+
+    The name is the value of `name`, or a comment, in the first line of the text. Otherwise, it is
+    made from `number`.
+    """
     match = _NAME.fullmatch(text.partition("\n")[0])
     return (match[1] or match[2]) if match else f"sequence {number}"
 
@@ -98,14 +102,14 @@ _LINES: Final = ("+", "loop")
 
 
 class SequenceTask(Task):
-    """Task that executes one sequence at a time.
+    """Task that executes the sequences of the monitor, one sequence at a time.
 
     Args:
         eds: content of EDS files by node-ID.
-        channel: bus on which the task sends, empty for the first bus.
+        channel: name of the bus on which the task sends, empty for the first bus.
 
     Attributes:
-        events: events of the execution. The latest event is last, and times count from the
+        events: events of the present execution, with the latest last. Their times count from the
             beginning.
     """
 

@@ -65,16 +65,16 @@ _STAMP_WIDTH: Final = 13
 
 @dataclass(frozen=True, slots=True)
 class TraceLines:
-    """Settings of the text of rows.
+    """Settings of the trace tab that determine the text of a line.
 
     Attributes:
         stamp: format of the time at the beginning of a line.
-        origin_us: time that is displayed as 0.
-        bits: whether to show bits instead of bytes.
-        meaning: whether to show the meaning of a frame after the frame.
-        channel_width: width of the bus name in characters, or 0 for no name.
-        counts: whether to show the number of frames of an identifier before the frame.
-        gaps: whether to show the time since the previous frame with the same identifier.
+        origin_us: time that is displayed as 0 in relative times.
+        bits: whether to show the payload as bits instead of bytes.
+        meaning: whether to show the decoded meaning after the frame.
+        channel_width: width of the bus name in characters, or 0 to omit the name.
+        counts: whether to show the number of earlier frames with the same CAN-ID.
+        gaps: whether to show the time since the previous frame with the same CAN-ID.
     """
 
     stamp: frames.Stamp = frames.Stamp.ZERO
@@ -298,7 +298,11 @@ class TracePanel(Panel):
         }
 
     def apply_filter(self, text: str) -> None:
-        """Show only frames that pass a filter. Raise FilterError if the text is not a filter."""
+        """Show only the frames that pass a filter.
+
+        Raises:
+            FilterError: the text is not a filter.
+        """
         wanted: Filter | None = parse_filter(text) if text else None
         with self.session.lock:
             self._display_filter = DisplayFilter(self.session.model.trace, wanted)
@@ -355,7 +359,7 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_stamp(self) -> None:
-        """Show the next time format: since the first frame, since the last one, absolute, date."""
+        """Switch to the next time format: since the first or previous frame, absolute, or date."""
         self.session.next_stamp()
         self.refresh_view()
 
@@ -420,7 +424,10 @@ class TracePanel(Panel):
             self.action_find()
 
     def action_bookmark(self) -> None:
-        """Set or remove a bookmark at the frame of the cursor, or at the first visible frame."""
+        """Set a bookmark at the frame of the cursor, or remove it.
+
+        Without a cursor, use the first visible frame.
+        """
         passed, view = self._passed(), self.query_one(LineView)
         number = passed.first + view.top if self._cursor is None else self._cursor
         for row in passed.rows(number, 1):

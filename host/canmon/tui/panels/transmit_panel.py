@@ -48,15 +48,15 @@ _NOW: Final = 0
 
 
 class TransmitTask(Task):
-    """Task that sends the rows of a list cyclically, or by hand.
+    """Task that sends the rows of the monitor's transmit list, cyclically or by hand.
 
     Args:
         eds: content of EDS files by node-ID.
-        channel: bus on which the task sends, empty for the first bus.
+        channel: name of the bus on which the task sends, empty for the first bus.
 
     Attributes:
-        words: text of each row.
-        list: list of the rows.
+        words: text of each row, as the user edits it.
+        list: transmit list with the frames of the rows.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
@@ -77,7 +77,15 @@ class TransmitTask(Task):
         self.words.append(words)
 
     def change(self, number: int, words: transmit.RowText) -> None:
-        """Replace a row. The old row is no longer sent. Raise ValueError as `add` does."""
+        """Replace a row of the transmit list. The old row is no longer sent.
+
+        Args:
+            number: number of the row, from 0.
+            words: text of the new row.
+
+        Raises:
+            ValueError: the text is invalid, as for `add`.
+        """
         self.list.rows[number] = words.row(self._pdos)
         self.words[number] = words
 
@@ -86,7 +94,16 @@ class TransmitTask(Task):
         del self.list.rows[number], self.words[number]
 
     def enable(self, number: int, now_us: int, *, armed: bool) -> None:
-        """Send a row in each period, or stop this. Raise ValueError if that is not allowed."""
+        """Start to send a row cyclically, or stop this if the row is sent already.
+
+        Args:
+            number: number of the row, from 0.
+            now_us: present time in microseconds.
+            armed: whether sending is armed.
+
+        Raises:
+            ValueError: the list is not armed, or the row has no period.
+        """
         row = self.list.rows[number]
         if row.enabled:
             row.disable()
