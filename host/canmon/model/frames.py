@@ -109,7 +109,7 @@ FD: Final = 1 << 33
 
 
 def ident_of(frame: CanFrame) -> int:
-    """Return the CAN-ID of a frame with two flags: one bit for extended, one bit for remote frames.
+    """Return the CAN-ID of a frame, with a flag bit for extended and a flag bit for remote frames.
 
     >>> hex(ident_of(CanFrame.parse("00000605#R")))
     '0xc0000605'
@@ -118,7 +118,7 @@ def ident_of(frame: CanFrame) -> int:
 
 
 def fd_ident(frame: FdFrame) -> int:
-    """Return the CAN-ID of a CAN FD frame with two flags: one bit for extended, one bit for CAN FD.
+    """Return the CAN-ID of a CAN FD frame, with a flag bit for extended and a flag bit for CAN FD.
 
     >>> hex(fd_ident(FdFrame.parse("00000605##1")))
     '0x280000605'

@@ -69,7 +69,10 @@ class TimeBins(Generic[_Key]):
         self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
-        """Widen the spans, if this is needed for a span that contains the time `at_us`."""
+        """Make sure that the time `at_us` lies in a span.
+
+        For a late time, the spans are widened and merged.
+        """
         shift = (at_us // self.width_us // self._most).bit_length()
         if not shift:
             return
@@ -124,7 +127,7 @@ class Thinned(Generic[_T]):
         self.count += 1
 
     def pass_over(self) -> bool:
-        """Count an item without creating it, if the list would not keep the item anyway.
+        """Count an item that the list would not keep, so that the caller need not create the item.
 
         If the list would keep the item, nothing is counted, and the result is False.
         """
@@ -309,7 +312,7 @@ class Survey(NodeBoard):
     def take(self, record: Record, decoded: Decoded) -> None:
         """Process a decoded frame: add its events to the chart of its node.
 
-        The frame is not counted.
+        The frame itself is not counted here.
         """
         kind, node, channel = decoded.kind, decoded.node, record.channel
         since_us = self.since(record.at_us)
@@ -427,7 +430,7 @@ class _Excerpt:
 def excerpts(
     pieces: Iterable[Sequence[Record]], numbers: Iterable[int], frames: int
 ) -> dict[int, _Frames]:
-    """Return an excerpt of a log around each of some frames, such as the frames of faults.
+    """Return the frames around some chosen frames of a log, such as the frames of faults.
 
     Args:
         pieces: all frames of the log in order, divided into pieces of any length.

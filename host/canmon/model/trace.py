@@ -48,7 +48,9 @@ class TraceRow(NamedTuple):
 
 
 class Ring:
-    """Buffer of trace rows with a fixed capacity. A new row replaces the oldest one.
+    """Buffer of trace rows with a fixed capacity.
+
+    If the buffer is full, a new row replaces the oldest one.
 
     Args:
         capacity: number of rows that are kept.

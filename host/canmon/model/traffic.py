@@ -198,8 +198,8 @@ class BitRow(NamedTuple):
 
     Attributes:
         latest: bits in which the latest payload differs from the previous one.
-        planes: number of changes of each payload bit, in binary. Integer n of the tuple holds
-            binary digit n of the numbers of all bits.
+        planes: numbers of changes of all payload bits, split into binary digits. Integer n holds
+            digit n of the number of each bit. `counts` returns the numbers.
         notched: bits whose changes the user marked as known, so they are not shown.
     """
 
@@ -513,7 +513,7 @@ class Load:
         """Count the bits of a frame.
 
         Returns:
-            The window that the time of the frame has ended, if any.
+            The previous second if the frame is the first one after it, otherwise None.
         """
         self._bits += bits
         begin_us, before = self._open

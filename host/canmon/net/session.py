@@ -103,7 +103,7 @@ class NetSession:
     def confirm(self, what: str, *, yes: bool, risk: str = "") -> None:
         """Ask the user before a command changes a node.
 
-        In the virtual time of a rig, it does not ask.
+        In the virtual time of a rig, the user is not asked.
 
         Args:
             what: description of the change, which becomes the question.

@@ -225,7 +225,7 @@ class _FramesLost(click.ClickException):
 
 
 def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) -> None:
-    """Print lost frames, invalid frames and other notes about a source at its end, and close it.
+    """Print notes about a source at its end, such as lost or invalid frames, and close the source.
 
     Raises:
         SourceFailed: the source ended early.

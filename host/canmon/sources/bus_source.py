@@ -64,7 +64,7 @@ class SocketReader:
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
         tally: counts of items that are not frames.
-        stepped: whether time passes only while the bus is read, which is always False here.
+        stepped: whether virtual time passes only while the bus is read, which is always False.
     """
 
     stepped = False
@@ -268,7 +268,9 @@ class OpenBus:
 
 
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
-    """Return the options of a bus after the SOURCE word is applied, which overrides other options.
+    """Combine the SOURCE word of a bus with the options of the command.
+
+    The word overrides the options.
 
     If `-i` names the interface, the whole word is the channel, including colons, unless the word
     begins with that interface.

@@ -174,7 +174,7 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A CAN bus as a SOURCE word names it, with a filter for its frames.
+    """A CAN bus as a SOURCE word of the command line names it, with a filter for its frames.
 
     Attributes that are None are taken from the options of the command. If there is a data bit rate,
     the bus is a CAN FD bus.
@@ -194,7 +194,7 @@ class BusSpec:
 
 @dataclass(frozen=True, slots=True)
 class LineSpec:
-    """A serial port as a SOURCE word names it, with the protocol of its line.
+    """A serial port as a SOURCE word of the command line names it, with the protocol of its line.
 
     Attributes:
         port: device name or pyserial URL of the port.
@@ -275,9 +275,9 @@ def _chosen(filters: str) -> CandumpFilter | None:
 
 @dataclass(frozen=True, slots=True)
 class LogCut:
-    """The part of a log that a command reads, from `--from` and `--to`.
+    """The part of a log that a command reads, as the options `--from` and `--to` select it.
 
-    By default, it is the whole log.
+    By default, the part is the whole log.
 
     Attributes:
         begin: first moment of the part, or None for the beginning of the log.
@@ -322,9 +322,9 @@ class _CutLog:
         self._first_us, self._last_us, self._passed = 0, 0, False
 
     def note(self, at_us: int) -> None:
-        """Record the time of the first frame of a file.
+        """Record the time of the first frame of one file.
 
-        Times count from the earliest of these frames.
+        If the log has several files, times count from the earliest of these frames.
         """
         if self._origin_us is not None and self._origin_us <= at_us:
             return
@@ -778,5 +778,8 @@ def _open_live(
 
 
 def is_live(word: str) -> bool:
-    """Return whether a SOURCE word names a source without an end: anything but a log file."""
+    """Return whether a SOURCE word names a source without an end, such as a bus.
+
+    Only a log file has an end.
+    """
     return not isinstance(parse_source(word), FileSpec)

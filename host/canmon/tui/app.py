@@ -63,7 +63,7 @@ _Light = tuple[str, str]
 
 
 class RecorderTask(Task):
-    """The recorder of the monitor, which writes all frames of the session into log files.
+    """The recorder of the monitor, which writes the frames of the session into log files.
 
     The log is written in parts, so that no earlier file is overwritten.
 

@@ -108,7 +108,7 @@ def triggered(at_us: int, why: str) -> Mark:
 
 
 def read_mark(at_us: int, text: str) -> Mark | None:
-    """Parse the comment of a log that a mark was written as. Return None for any other comment.
+    """Return the mark that a comment in a log describes, or None for any other comment.
 
     >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
     True
@@ -292,7 +292,11 @@ class LogFormatError(ValueError):
 
 
 class LogError(ValueError):
-    """A log file is truncated or not of its format, or this machine cannot write the format."""
+    """A log file cannot be read or written.
+
+    The file is truncated, is not a log of its format, or has a format that this machine cannot
+    write.
+    """
 
 
 def log_format(path: Path) -> LogFormat:

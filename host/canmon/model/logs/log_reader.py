@@ -109,7 +109,7 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return a clock for a text of candump lines, after a look at the time stamps in it.
+        """Return the clock that fits the time stamps in a text of candump lines.
 
         If the stamps often decrease, or decrease by much, they count from the previous frame.
         """
@@ -350,7 +350,7 @@ def is_usual(line: str) -> bool:
 def holds_frame(line: str) -> bool:
     """Return whether a line is a classic CAN frame as `candump -L` writes it.
 
-    A CAN FD frame and a mark are not.
+    The result is False for a CAN FD frame or a mark.
     """
     return "##" not in line and _LINE.fullmatch(line.strip()) is not None
 

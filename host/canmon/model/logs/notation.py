@@ -78,7 +78,7 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Return a message of a serial line as one line of JSON, which is an event for `json_line`.
+    """Return a message of a serial line as one line of JSON, in the form of an event.
 
     `more` contains further members, each with a comma before it.
 

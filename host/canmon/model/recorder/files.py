@@ -83,7 +83,7 @@ DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 class RecordingPlan:
     """Settings of a recording: its files, their limits, and the trigger.
 
-    By default, it is one file.
+    By default, the recording is the single file `path`.
 
     Attributes:
         path: path of the file. If the recording has parts, their names are derived from this path.

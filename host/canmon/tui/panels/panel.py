@@ -47,7 +47,9 @@ _CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
-    """A list of lines in a panel, of which the user chooses one. It is shown in reverse video.
+    """A list of lines in a panel, of which the user chooses one.
+
+    The chosen line is shown in reverse video.
 
     Attributes:
         chosen: number of the chosen line, from 0.
@@ -209,7 +211,7 @@ def ansi_line(text: str, styles: Mapping[str, str]) -> Line:
 
 
 def read_help(module: str) -> str:
-    """Return the help text of a tab in Markdown, which is a file beside the module of the tab."""
+    """Return the help text of a tab, which is a Markdown file beside the module of the tab."""
     return Path(module).with_suffix(".md").read_text("utf-8")
 
 
