@@ -778,8 +778,5 @@ def _open_live(
 
 
 def is_live(word: str) -> bool:
-    """Return whether a SOURCE word names a source without an end, such as a bus.
-
-    Only a log file has an end.
-    """
+    """Return whether a SOURCE word names anything but a log file, such as a bus."""
     return not isinstance(parse_source(word), FileSpec)
