@@ -55,10 +55,10 @@ class TimeBins(Generic[_Key]):
 
     Args:
         most: maximum number of spans.
-        width_us: present width of a span in microseconds.
+        width_us: initial width of a span in microseconds.
 
     Attributes:
-        width_us: present width of a span.
+        width_us: present width of a span in microseconds.
         sums: sum of the amounts in each span, by key and then by number of the span.
         ranges: least and greatest value in each span, by key and then by number of the span.
     """
