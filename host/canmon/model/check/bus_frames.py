@@ -29,11 +29,11 @@ _SPIKE_FRAMES: Final = 3
 
 
 class FramePlace(NamedTuple):
-    """The position and time of a frame in a log.
+    """The number and time of a frame in a log, by which a fault names the frames that show it.
 
     Attributes:
-        number: position of the frame in the log, from 1.
-        at_us: time of the frame.
+        number: position of the frame in the log. The first frame has number 1.
+        at_us: time of the frame in microseconds.
     """
 
     number: int
@@ -41,14 +41,15 @@ class FramePlace(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """One violation, before the findings of one rule and node are combined.
+    """A violation of a rule on one bus. Violations of one rule by one node later become one fault.
 
     Attributes:
-        rule: name of the rule.
-        node: node-ID of the responsible node, or None if no node is responsible.
-        ident: CAN-ID with flags, or None for the bus as a whole.
+        rule: name of the violated rule.
+        node: node-ID of the node that violated the rule, or None if no single node did.
+        ident: CAN-ID of the violation with its flags, as in `BusFrames.ident`, or None if the
+            violation concerns the whole bus.
         text: description of the violation.
-        rows: rows of the bus with the frames that show the violation. There is at least one row.
+        rows: indices in `BusFrames` of the frames that show the violation, at least one.
         amount: number of violations in these frames.
     """
 
@@ -61,16 +62,19 @@ class Hit(NamedTuple):
 
 
 class BusFrames:
-    """The frames of one bus in the order of the log.
+    """All frames of one bus in the order of the log, stored as one array for each property.
+
+    The index of a frame in these arrays is called its row.
 
     Attributes:
         name: name of the bus.
-        at_us: times of the frames as in the log.
-        ident: identifiers as `any_ident` returns them. Error frames have `ERROR` and their class.
-        dlc: number of data bytes. For a remote frame, it is the DLC.
-        payload: first 8 data bytes as a little-endian number.
-        number: positions in the log, from 1.
-        sent: value 1 for frames that the recorder sent.
+        at_us: times of the frames in microseconds, exactly as in the log.
+        ident: CAN-IDs with their flags, as `any_ident` returns them. An error frame has the flag
+            `ERROR` and its error class.
+        dlc: number of data bytes of each frame. For a remote frame, it is the requested number.
+        payload: first 8 data bytes of each frame as a little-endian number.
+        number: position of each frame in the log. The first frame has number 1.
+        sent: value 1 for each frame that the recorder itself sent, otherwise 0.
     """
 
     def __init__(self, name: str) -> None:
@@ -95,7 +99,12 @@ class BusFrames:
         self.sent.append(record.sent)
 
     def extend(self, frames: Columns, numbers: Any) -> None:
-        """Append a block of frames. `numbers` is an array of their positions in the log."""
+        """Append a block of frames.
+
+        Args:
+            frames: frames to append.
+            numbers: array with the position of each of these frames in the log, from 1.
+        """
         self.at_us.frombytes(frames.at_us.astype("<i8").tobytes())
         self.ident.frombytes(frames.ident.astype("<u8").tobytes())
         self.dlc.frombytes(frames.dlc.tobytes())
@@ -140,7 +149,10 @@ class BusFrames:
         return len(self) >= _MANY and find_spec("numpy") is not None
 
     def picked(self, column: array[int], rows: Sequence[int]) -> Sequence[int]:
-        """Return some rows of a column. If the rows are a numpy array, so are the values."""
+        """Return the values of some rows of one array of this class.
+
+        If `rows` is a numpy array, the values are returned as a numpy array, otherwise as a list.
+        """
         if isinstance(rows, list | tuple | range):
             return [column[row] for row in rows]
         kinds = {"q": np.int64, "Q": np.uint64, "B": np.uint8}
@@ -163,10 +175,14 @@ class BusFrames:
 
 
 def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], list[int]]:
-    """Return corrected times, and the rows where the clock was set back.
+    """Return the times of a bus without jumps, and the rows at which the clock was set back.
 
-    A single frame whose time is out of order gets the time of its neighbour. After the clock was
-    set back, the times are kept unchanged.
+    If only a few frames are out of order, each gets the time of a neighbouring frame. If the clock
+    of the recorder was set back, the times after that remain as they are in the log.
+
+    Args:
+        bus: frames of the bus.
+        backward: rows whose time is before the time of the previous row.
     """
     times = bus.at_us
     if not backward:
@@ -195,11 +211,11 @@ def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], l
 
 
 class FrameKeeper:
-    """Storage of all frames of a source, separately for each bus.
+    """Storage for all frames of a source, separated by bus, for rules that need the whole log.
 
     Attributes:
         buses: frames of each bus, by name.
-        frames: number of stored frames.
+        frames: number of frames stored so far, on all buses.
     """
 
     def __init__(self) -> None:
@@ -227,14 +243,16 @@ class FrameKeeper:
         self.frames += len(columns)
 
     def around(self, number: int, frames: int) -> tuple[int, list[Record]]:
-        """Return the frames around a frame. None of them may be a CAN FD frame.
+        """Return a frame of the log together with some frames before and after it.
 
         Args:
-            number: position of the frame in the log, from 1.
-            frames: number of frames before and after the frame.
+            number: position of the frame in the log. The first frame has number 1.
+            frames: number of frames to return before the frame, and also after it. None of these
+                may be a CAN FD frame.
 
         Returns:
-            The position of the first of these frames, and the frames in the order of the log.
+            The position in the log of the first returned frame, and the frames in the order of the
+            log.
         """
         first, found = max(1, number - frames), list[tuple[int, Record]]()
         for bus in self.buses.values():

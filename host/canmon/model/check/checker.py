@@ -66,11 +66,11 @@ if TYPE_CHECKING:
 
 
 class Unjudged(NamedTuple):
-    """Rules that could not be judged.
+    """Rules that a check could not judge, so that they do not count as passed.
 
     Attributes:
-        rules: reason for each rule that judged nothing, by name of the rule.
-        notes: notes on rules that could be judged only in part.
+        rules: reason why nothing was judged, by name of the rule.
+        notes: texts about rules that could be judged only in part.
     """
 
     rules: Mapping[str, str]
@@ -103,7 +103,14 @@ class RuleCheck:
         raise NotImplementedError
 
     def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
-        """Return the violation of the load limit in a second of a bus, if there is one."""
+        """Return the violation of the load limit in one second of a bus.
+
+        The list has one finding if the load is too high. Otherwise it is empty.
+
+        Args:
+            channel: name of the bus.
+            window: second to judge, with the number of its bits.
+        """
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
 
@@ -157,19 +164,22 @@ class RuleCheck:
 
 
 class Checker(RuleCheck):
-    """Checker that applies rules to frames.
+    """Checker that judges frames by rules, one frame at a time, live or from a log.
 
-    The memory of the checker grows with the number of identifiers, not with the number of frames.
+    The memory that the checker needs grows with the number of CAN-IDs, not with the number of
+    frames.
 
     Args:
-        rules: rules to check. Rules that are written as expressions need decoded frames.
-        bit_rate: bit rate in bits per second, used for the load.
-        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS.
-            Without it, the data of such frames are counted at `bit_rate`.
-        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+        rules: rules to check. Rules that are expressions, such as `181 every 10ms`, need decoded
+            frames.
+        bit_rate: bit rate in bits per second, from which the bus load is calculated. If it is None,
+            the bit rate in `rules` is used.
+        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS. If
+            it is None, the data phase is assumed to have the rate `bit_rate`.
+        eds_heartbeats: producer heartbeat times (1017h) from EDS files, in ms, by node-ID.
 
     Raises:
-        ValueError: there is a limit of the load, but no bit rate.
+        ValueError: the rules limit the bus load, but the bit rate is unknown.
     """
 
     def __init__(
@@ -187,11 +197,14 @@ class Checker(RuleCheck):
         self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
 
     def take(self, record: Record, decoded: Decoded | None = None) -> list[TrafficFinding]:
-        """Check a frame, and the load of the second that it completed. Return the violations.
+        """Check a frame and return the violations that it shows.
+
+        If the frame is the first after a full second, the bus load of that second is checked, too.
 
         Args:
             record: frame to check.
-            decoded: decoded frame, used by rules that are expressions.
+            decoded: meaning of the frame. Rules that are expressions judge the frame only if it is
+                given.
         """
         if decoded is None or not self._expressions:
             return self._taken(record)
@@ -232,13 +245,14 @@ class Checker(RuleCheck):
         judged_us: int | None = None,
         errors: Iterable[str] = (),
     ) -> list[TrafficFinding]:
-        """Return findings about frames that are missing at the end of the traffic.
+        """Return the findings that are known only at the end, such as frames that never arrived.
 
         Args:
-            end_us: time when listening ended.
-            lost: report of the source about lost frames and items that are not frames.
-            judged_us: time up to which expressions are judged, or None for `end_us`.
-            errors: report of the source about errors in addition to its error frames.
+            end_us: time in microseconds at which listening ended.
+            lost: messages of the source about lost frames, and about lines of a log that are not
+                frames.
+            judged_us: time up to which rules that are expressions are judged, or None for `end_us`.
+            errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)
         judged_us = end_us if judged_us is None else judged_us
@@ -249,11 +263,11 @@ class Checker(RuleCheck):
         return self._ended({}, now_us) + self._written_ended(now_us)
 
     def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
-        """Return the rules that could not be judged up to a time.
+        """Return the rules that have judged nothing by the end of the traffic, with the reasons.
 
         Args:
-            end_us: time when listening ended.
-            without_errors: reason why the source cannot contain error frames.
+            end_us: time in microseconds at which listening ended.
+            without_errors: reason why the source cannot contain error frames, empty if it can.
         """
         return self._unjudged(end_us, without_errors, self._expressions)
 
@@ -299,13 +313,13 @@ class _Waiting:
 
 
 class Surroundings:
-    """Collector that adds to each finding the frames before and after it.
+    """Collector that adds the frames before and after a violation to each finding.
 
-    The collector holds each finding until the frames after it have arrived.
+    The collector holds a finding back until the frames after the violation have arrived.
 
     Args:
-        frames: number of frames before, and number of frames after a finding.
-        rules: names of the rules whose findings get these frames.
+        frames: number of frames to add before the violation, and also after it.
+        rules: names of the rules whose findings get these frames. Other findings stay unchanged.
     """
 
     def __init__(self, frames: int, rules: Iterable[str]) -> None:
@@ -316,7 +330,15 @@ class Surroundings:
     def take(
         self, record: Record, decoded: Decoded, found: Sequence[TrafficFinding]
     ) -> list[TrafficFinding]:
-        """Add a frame and its findings. Return the findings that are now complete, in order."""
+        """Add a frame and the findings that it caused, and return all findings that are complete.
+
+        A finding is complete when enough frames have arrived after it. Findings keep their order.
+
+        Args:
+            record: frame that has arrived.
+            decoded: meaning of the frame.
+            found: findings that the frame caused.
+        """
         shown = record, decoded
         for one in self._waiting:
             if one.wanted:
@@ -359,14 +381,17 @@ because this machine may not have read it yet.
 
 
 class DecodedCheck:
-    """Check of frames against rules. Findings of expressions contain the frames around them.
+    """Check of frames by all rules, which decodes the frames first if a rule needs their meaning.
+
+    `canmon check` uses this class. Findings of rules that are expressions also contain the frames
+    around the violation.
 
     Args:
         rules: rules to check.
-        rates: bit rates of the buses, used for the load.
-        decoder: decoder of the frames, or None if no rule needs decoded frames.
-        around: number of frames shown before and after a finding of an expression.
-        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+        rates: bit rates of the bus, from which the bus load is calculated.
+        decoder: decoder of the frames, or None if no rule needs the meaning of frames.
+        around: number of frames to show before a violation, and also after it.
+        eds_heartbeats: producer heartbeat times (1017h) from EDS files, in ms, by node-ID.
     """
 
     def __init__(
@@ -394,12 +419,15 @@ class DecodedCheck:
         return found
 
     def wait(self, now_us: int, has_clock: bool) -> list[TrafficFinding]:
-        """Return findings about overdue frames, and waiting findings, while no frame arrives.
+        """Return the findings that are due while no frame arrives.
+
+        The method is called repeatedly. After one second without a frame, it returns findings that
+        were held back, and findings about overdue frames.
 
         Args:
-            now_us: time at the source by the clock of this machine.
-            has_clock: whether the source uses the clock of this machine. A bus does, a pipe may
-                not.
+            now_us: current time in microseconds on the clock of the source.
+            has_clock: whether the frames are stamped by the clock of this machine. This is true for
+                a bus. It may be false for a pipe, and overdue frames are then not reported.
         """
         if now_us - self._latest_us <= _QUIET_US:
             return []
@@ -443,13 +471,13 @@ class AlarmState(StrEnum):
 
 @dataclass(slots=True)
 class Alarm:
-    """The state of one rule.
+    """The alarm of one rule for live traffic: whether the rule is broken, and how often it was.
 
     Attributes:
         rule: name of the rule.
-        count: number of findings. A lasting violation counts once.
-        finding: latest finding of the rule.
-        lasting: whether the violation is a missing frame.
+        count: number of findings. A violation that lasts counts once.
+        finding: latest finding of the rule, or None if there was none.
+        lasting: whether the rule is broken because a frame is still missing.
         acknowledged: whether the user has acknowledged the latest finding.
     """
 
@@ -470,19 +498,23 @@ class Alarm:
 
 @dataclass(slots=True)
 class Alarms:
-    """Alarms that check frames against rules as the frames arrive.
+    """Live check of rules that keeps for each rule whether it is broken now or was broken before.
+
+    The alarms panel of `canmon tui` shows these alarms, and a recording can be triggered by them.
 
     Args:
         rules: rules to check.
-        bit_rate: bit rate in bits per second, used for the load.
-        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS.
+        bit_rate: bit rate in bits per second, from which the bus load is calculated, or None to use
+            the bit rate in `rules`.
+        data_bit_rate: bit rate in bits per second in the data phase of CAN FD frames with BRS, or
+            None if it equals `bit_rate`.
 
     Attributes:
-        findings: latest findings. The oldest finding is first.
-        judged: whether a frame was checked.
+        findings: latest findings, from the oldest to the newest.
+        judged: whether at least one frame was checked.
 
     Raises:
-        ValueError: there is a limit of the load, but no bit rate.
+        ValueError: the rules limit the bus load, but the bit rate is unknown.
     """
 
     rules: Rules
@@ -513,11 +545,13 @@ class Alarms:
             self._found(finding)
 
     def check_missing(self, now_us: int, lost: int = 0) -> None:
-        """Check which frames are missing now, and update the alarms.
+        """Update the alarms for frames that are missing or lost at the current time.
+
+        This method is called repeatedly, because a missing frame cannot trigger a check itself.
 
         Args:
-            now_us: current time on the clock of the frames.
-            lost: number of frames lost until now.
+            now_us: current time in microseconds on the clock of the frames.
+            lost: total number of frames that were lost until now.
         """
         if self._begin_us is None:
             self._lost = lost
@@ -582,7 +616,15 @@ _NO_FRAME: Final = "no frame"
 
 
 def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
-    """Return lines of text: a header, a line for each rule, and the findings, the latest first."""
+    """Return the alarms as lines of text for the alarms panel.
+
+    The lines are a table with one rule in each line, followed by the findings from the latest to
+    the oldest.
+
+    Args:
+        alarms: alarms to show.
+        now_us: current time in microseconds, used for the age of findings.
+    """
     rows = alarms.rows()
     least, most = _RULE_WIDTHS
     width = min(most, max([least, *(len(alarm.rule) for alarm in rows)]))

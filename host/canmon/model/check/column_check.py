@@ -44,17 +44,19 @@ _Placed = tuple[int, int, TrafficFinding]
 
 
 class ColumnChecker(RuleCheck):
-    """Checker of blocks of frames. It finds what `Checker` finds frame by frame.
+    """Checker that judges frames by rules, one block of frames at a time, with numpy.
 
-    The memory of the checker grows with the number of identifiers, not with the number of frames.
+    It returns the same findings as `Checker`, which judges frames one by one, but is faster. The
+    memory that it needs grows with the number of CAN-IDs, not with the number of frames.
 
     Args:
-        rules: rules to check.
-        bit_rate: bit rate in bits per second, used for the load.
-        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+        rules: rules to check. Rules that are expressions are not supported.
+        bit_rate: bit rate in bits per second, from which the bus load is calculated. If it is None,
+            the bit rate in `rules` is used.
+        eds_heartbeats: producer heartbeat times (1017h) from EDS files, in ms, by node-ID.
 
     Raises:
-        ValueError: there is a limit of the load, but no bit rate.
+        ValueError: the rules limit the bus load, but the bit rate is unknown.
     """
 
     def __init__(
@@ -87,11 +89,12 @@ class ColumnChecker(RuleCheck):
         return [finding for _, _, finding in placed]
 
     def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[TrafficFinding]:
-        """Return findings about frames that are missing at the end of the traffic.
+        """Return the findings that are known only at the end, such as frames that never arrived.
 
         Args:
-            lost: report of the source about lost frames and items that are not frames.
-            errors: report of the source about errors in addition to its error frames.
+            lost: messages of the source about lost frames, and about lines of a log that are not
+                frames.
+            errors: messages of the source about bus errors that it did not report as error frames.
         """
         loads = {channel: seconds.load for channel, seconds in self._loads.items()}
         return self._ended(loads, self._last_us, lost, errors)
@@ -152,7 +155,11 @@ class _BusSelection:
         self._frames = np.empty(0, np.int64)
 
     def take(self, frames: Columns) -> tuple[Ints, Ints]:
-        """Return the rows of selected frames and error frames, and the gap before each row."""
+        """Return the rows of the frames that a rule must see, and the time gap before each of them.
+
+        Args:
+            frames: block of frames of one bus.
+        """
         errors = frames.ident & ERROR != 0
         plain = np.flatnonzero(~errors)
         found = np.flatnonzero(errors) if self._errors else plain[:0]

@@ -78,16 +78,21 @@ class _Level(NamedTuple):
 
 
 class Rhythm(NamedTuple):
-    """The rhythm of the frames of an identifier.
+    """The rhythm of a CAN-ID that is sent periodically, and all deviations from its period.
+
+    A gap is the time between two successive frames.
 
     Attributes:
-        levels: periods in order. There is more than one if the period changed.
-        missing: gaps in which frames are missing, each with the number of missing frames.
-        extra: surplus frames between two frames that keep the period.
-        noisy: first and last gap of each part with large jitter, and the usual and the large jitter
-            in us.
-        spread_us: interquartile range of the gaps, in parts with usual jitter.
-        share: fraction of the gaps that have the period.
+        levels: parts of the log with one period each, in order. There are several if the period
+            changed.
+        missing: gaps in which frames are missing, each as the index of the gap and the number of
+            missing frames.
+        extra: indices of surplus frames, which lie between two frames that keep the period.
+        noisy: parts with large jitter, each as the first gap, the last gap, the usual jitter and
+            the large jitter, both in us.
+        spread_us: usual jitter in us, as interquartile range of the gaps outside of the noisy
+            parts.
+        share: fraction of the gaps that have the main period, from 0 to 1.
     """
 
     levels: tuple[_Level, ...]
@@ -104,7 +109,10 @@ class Rhythm(NamedTuple):
 
 
 def rhythm_of(times: Sequence[int]) -> Rhythm | None:
-    """Return the rhythm of frames from their times, or None if they have no rhythm.
+    """Return the rhythm of the frames of one CAN-ID, or None if they are not periodic.
+
+    Args:
+        times: times of the frames in microseconds, in order.
 
     >>> rhythm_of([0, 10_000, 20_000, 30_000, 50_000, 60_000, 70_000, 80_000]).missing
     ((3, 1),)

@@ -19,14 +19,14 @@ from tickrig.wire.instant import NEVER
 
 @dataclass(frozen=True, slots=True)
 class RuleEvent:
-    """The event of a rule, which is a frame that passes a filter.
+    """The event in a rule: a filter, and each frame that passes it is an occurrence of the event.
 
     Attributes:
-        text: text of the filter.
-        matches: function that returns whether a frame passes.
-        paths: signals that the filter names.
-        is_signal: whether the filter is a single signal without a comparison.
-        has_node: whether the filter names a node.
+        text: text of the filter as written in the rule.
+        matches: function that returns whether a frame passes the filter.
+        paths: names of the signals in the filter.
+        is_signal: whether the filter is only the name of a signal, without a comparison.
+        has_node: whether the filter contains a node-ID.
     """
 
     text: str
@@ -41,7 +41,11 @@ class RuleEvent:
         return lambda decoded: any(find(decoded) is not None for find in finders)
 
     def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
-        """Return a function that finds the named signal in a frame, or else its first signal."""
+        """Return a function that finds the value to judge in a frame.
+
+        If the event is a signal, the function returns this signal. For any other event, it returns
+        the first signal of a frame that passes the filter. Without such a signal, it returns None.
+        """
         matches = self.matches
         if self.is_signal:
             finders = [signal_reader(path) for path in self.paths]
@@ -73,12 +77,13 @@ def _said(decoded: Decoded) -> str:
 
 
 class RuleBreach(NamedTuple):
-    """A violation and its time.
+    """A violation that a demand detects while no frame arrives, because a deadline has passed.
 
     Attributes:
-        at_us: time at which the violation was detected.
+        at_us: time in microseconds at which the violation was detected.
         text: description of the violation.
-        record: frame that shows the violation, or None if no frame does.
+        record: frame that shows the violation, such as the unanswered request, or None if no frame
+            does.
     """
 
     at_us: int
@@ -87,18 +92,19 @@ class RuleBreach(NamedTuple):
 
 
 class RuleDemand:
-    """One demand of a rule. This base class is always met.
+    """Base class of the demands of rules, such as `every 10ms` in the rule `181 every 10ms`.
 
-    The memory of a demand grows at most with the number of identifiers.
+    This class itself demands nothing. Its memory grows at most with the number of CAN-IDs.
 
     Attributes:
-        due_us: time by which a frame must have arrived.
-        came: whether a frame that the demand counts has arrived. The value is False if the demand
-            counts no frames.
-        judged: whether a frame was compared with the demand.
+        due_us: time in microseconds by which a frame must arrive, or `NEVER`. After this time,
+            `expire` reports the violation.
+        came: whether a frame that the demand counts has arrived. The value stays False if the
+            demand counts no frames.
+        judged: whether at least one frame was judged, so that the rule can count as passed.
         timed: whether the demand is about time. Such a demand judges nothing if all frames have the
             same time.
-        doubt: reason why nothing was judged, empty if something was judged.
+        doubt: reason that is reported if nothing was judged.
     """
 
     due_us: int = NEVER
@@ -122,11 +128,12 @@ class RuleDemand:
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Return a description of each frame that is missing at the end.
+        """Yield a description of each violation that is known only at the end, as a missing frame.
 
         Args:
-            end_us: the end of the traffic, or the current time if it continues.
-            running: whether the scope of the rule applies.
+            end_us: end of the traffic in microseconds, or the current time if the traffic
+                continues.
+            running: whether the rule applies at this time, because its scope is active.
         """
         return ()
 
@@ -138,13 +145,13 @@ MOST_COUNTED: Final = 10_000
 
 
 class Truth(RuleDemand):
-    """Demand that a condition on signals is always true, or never true.
+    """Demand that a condition on signals is always true, or that it is never true.
 
-    A violation is reported when it starts, not with each frame.
+    A violation is reported when it begins. It is not reported again while it lasts.
 
     Args:
-        event: condition on signals.
-        wanted: required value of the condition.
+        event: condition on signals, such as `position > 100`.
+        wanted: True if the condition must always be true, False if it must never be true.
     """
 
     def __init__(self, event: RuleEvent, wanted: bool) -> None:
@@ -171,10 +178,10 @@ class Truth(RuleDemand):
 
 
 class Never(RuleDemand):
-    """Demand that certain frames never arrive. Each such frame is reported.
+    """Demand that certain frames never arrive. Each of these frames is reported as a violation.
 
     Args:
-        event: frames that must not arrive.
+        event: event that selects the forbidden frames.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -187,12 +194,13 @@ class Never(RuleDemand):
 
 
 class Count(RuleDemand):
-    """A limit of the number of frames.
+    """Demand that limits how many frames of a kind arrive in total.
 
     Args:
-        event: frames to count.
-        least: smallest allowed number. Too few frames are reported at the end.
-        most: largest allowed number, or None for no limit. An excess is reported once.
+        event: event that selects the frames to count.
+        least: smallest allowed number of frames. If fewer arrive, this is reported at the end.
+        most: largest allowed number of frames, or None for no limit. The first frame above the
+            limit is reported.
     """
 
     def __init__(self, event: RuleEvent, least: int, most: int | None) -> None:
@@ -217,12 +225,12 @@ class Count(RuleDemand):
 
 
 class Rate(RuleDemand):
-    """A limit of the number of frames in any span of time of a given length.
+    """Demand that limits how many frames of a kind arrive within any period of a given length.
 
     Args:
-        event: frames to count.
-        most: largest allowed number, up to `MOST_COUNTED`.
-        span_us: length of the span of time.
+        event: event that selects the frames to count.
+        most: largest allowed number of frames in the period, up to `MOST_COUNTED`.
+        span_us: length of the period in microseconds.
     """
 
     timed = True
@@ -267,12 +275,13 @@ _NodeOnBus = tuple[str, int | None]
 
 
 class Dlc(RuleDemand):
-    """Demand that frames have the length that CiA 301 or the mapping of a PDO defines.
+    """Demand that frames have the right number of data bytes.
 
-    Remote frames, and PDOs with an unknown mapping, are not judged.
+    The right number comes from CiA 301 or from the mapping of a PDO. Remote frames, and PDOs whose
+    mapping is unknown, are not judged.
 
     Args:
-        event: frames to judge.
+        event: event that selects the frames to judge.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -315,15 +324,17 @@ class _Guarding:
 
 
 class Toggle(RuleDemand):
-    """Demand that the toggle bit of node guarding changes with each answer.
+    """Demand that the toggle bit changes with each answer to a node guarding request.
 
-    The toggle bit is 0 after a boot-up.
+    The toggle bit must be 0 in the first answer after a boot-up.
 
-    An answer is a frame after a request. If a log has no requests, all frames after a frame with
-    the toggle bit set count as answers. A node that produces heartbeats sends no answers.
+    A frame counts as an answer if it follows a request. If the log contains no requests, frames
+    count as answers as soon as one of them has the toggle bit set. A node that produces heartbeats
+    is not judged, because it does not answer guarding requests.
 
     Args:
-        event: answers, including answers of a node that was guarded before.
+        event: event that selects the nodes to judge. A node stays selected after its first matching
+            frame.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -386,14 +397,14 @@ class Toggle(RuleDemand):
 
 
 class Every(RuleDemand):
-    """Limits of the time between two frames of an identifier.
+    """Demand that limits the time between two successive frames of the same CAN-ID.
 
-    The first frame after a boot-up may be late.
+    The time before the first frame after a boot-up is not judged.
 
     Args:
-        event: frames to judge.
-        low_us: shortest time from the previous frame.
-        high_us: longest time from the previous frame, or None for no limit.
+        event: event that selects the frames to judge.
+        low_us: shortest allowed time between two frames in microseconds.
+        high_us: longest allowed time between two frames in microseconds, or None for no limit.
     """
 
     timed = True
@@ -448,11 +459,14 @@ class Every(RuleDemand):
 
 
 class FirstWithin(RuleDemand):
-    """Demand that a frame arrives within a time after the traffic, or the rule's scope, begins.
+    """Demand that a first frame arrives in time.
+
+    The time counts from the beginning of the traffic, or from the moment when the rule begins to
+    apply.
 
     Args:
-        event: frame that must arrive.
-        most_us: longest time until the frame.
+        event: event that selects the frame that must arrive.
+        most_us: longest allowed time until the frame, in microseconds.
     """
 
     timed = True
@@ -532,15 +546,15 @@ class _DeadlineDemand(RuleDemand):
 
 
 class Latency(_DeadlineDemand):
-    """Demand that a second event follows a first event within a time.
+    """Demand that a second event follows a first event within a given time.
 
-    If the first event occurs again before the second one, time counts from its earlier occurrence.
-    If the events name no node, both must come from frames of the same node.
+    If the first event occurs again before the second event, the time still counts from its first
+    occurrence. If neither event names a node, both events must come from the same node.
 
     Args:
         first: event that starts the time.
         second: event that must follow.
-        most_us: longest time between them.
+        most_us: longest allowed time between the events, in microseconds.
     """
 
     def __init__(self, first: RuleEvent, second: RuleEvent, most_us: int) -> None:
@@ -561,13 +575,13 @@ class Latency(_DeadlineDemand):
 
 
 class Answered(_DeadlineDemand):
-    """Demand for an answer within a time after a request of an SDO client or a guarding master.
+    """Demand that each SDO request and each node guarding request is answered within a given time.
 
-    For a repeated request, time counts from the first one.
+    If a client or master repeats a request, the time counts from the first request.
 
     Args:
-        event: requests of clients and masters.
-        most_us: longest time until the answer.
+        event: event that selects the requests.
+        most_us: longest allowed time until the answer, in microseconds.
     """
 
     def __init__(self, event: RuleEvent, most_us: int) -> None:
@@ -596,15 +610,17 @@ _EMCY: Final = "emcy"
 
 
 class In(RuleDemand):
-    """Demand that a value is one of the valid values.
+    """Demand that a value belongs to a set of valid values.
 
-    For a signal, a violation is reported when it starts. For other events, it is reported for each
-    frame. An EMCY with code 0000h clears an error, and is valid.
+    If the event is a signal, a violation is reported when it begins. For other events, each frame
+    with an invalid value is reported. An EMCY with error code 0000h is always valid, because it
+    reports that an error is gone.
 
     Args:
-        event: signal, or kind of frames. For a kind of frames, the first value counts.
-        values: text of the set of valid values in the rule.
-        holds: function that returns whether a signal has one of the values.
+        event: name of a signal, or event that selects frames. Of a selected frame, the first value
+            is judged.
+        values: set of valid values as written in the rule, used in messages.
+        holds: function that returns whether the value of a signal is valid.
     """
 
     def __init__(self, event: RuleEvent, values: str, holds: Callable[[Signal], bool]) -> None:
@@ -634,10 +650,11 @@ class In(RuleDemand):
 
 
 class Follow(RuleDemand):
-    """Base class of demands that compare a value with the previous one of the same identifier.
+    """Base class of demands that compare each value with the previous value from the same CAN-ID.
 
     Args:
-        event: signal, or kind of frames, as in `In`.
+        event: name of a signal, or event that selects frames. Of a selected frame, the first value
+            is used.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -671,7 +688,10 @@ class Follow(RuleDemand):
 
 
 class Counts(Follow):
-    """Demand that a counter increases by one. From its highest value, it continues with 0 or 1."""
+    """Demand that a counter in a frame increases by one from frame to frame.
+
+    After its highest value, the counter must restart at 0 or 1.
+    """
 
     def __init__(self, event: RuleEvent) -> None:
         super().__init__(event)
@@ -687,11 +707,12 @@ class Counts(Follow):
 
 
 class Steps(Follow):
-    """A limit of the change of a value from one frame to the next.
+    """Demand that limits how much a value may change from one frame to the next.
 
     Args:
-        event: signal, or kind of frames, as in `In`.
-        most: largest allowed change.
+        event: name of a signal, or event that selects frames. Of a selected frame, the first value
+            is used.
+        most: largest allowed change, in the unit of the value.
     """
 
     def __init__(self, event: RuleEvent, most: float) -> None:
@@ -707,11 +728,14 @@ class Steps(Follow):
 
 
 class Changes(RuleDemand):
-    """Demand that a value changes within a time. A violation is reported once.
+    """Demand that a value does not stay constant for too long, as the value of a dead sensor does.
+
+    A violation is reported once, until the value changes again.
 
     Args:
-        event: signal, or kind of frames, as in `In`.
-        most_us: longest time without a change.
+        event: name of a signal, or event that selects frames. Of a selected frame, the first value
+            is used.
+        most_us: longest allowed time without a change, in microseconds.
     """
 
     timed = True

@@ -132,18 +132,19 @@ _NO_NODES: Final[Mapping[int, node_memory.EdsObjects]] = MappingProxyType({})
 
 
 class BusFault(NamedTuple):
-    """A fault on a bus, with all findings of one rule about one node or one CAN-ID.
+    """A fault on a bus, which combines all violations of one rule by one node or CAN-ID.
 
     Attributes:
-        rule: name of the rule in `RULES`.
-        channel: name of the bus.
-        node: node-ID of the responsible node, or None if no node is responsible.
-        ident: CAN-ID with flags of the first occurrence, or None for the bus as a whole.
+        rule: name of the violated rule, a key of `RULES`.
+        channel: name of the bus, empty if the fault concerns the whole source.
+        node: node-ID of the node that caused the fault, or None if no single node did.
+        ident: CAN-ID of the first violation with its flags, as in `BusFrames.ident`, or None if the
+            fault concerns the whole bus.
         text: description of the fault.
-        first_us: time of the first occurrence.
-        last_us: time of the last occurrence.
-        amount: number of occurrences.
-        frames: first thousand frames that show the fault.
+        first_us: time of the first violation in microseconds.
+        last_us: time of the last violation in microseconds.
+        amount: number of violations.
+        frames: numbers and times of the frames that show the fault, at most the first thousand.
     """
 
     rule: str
@@ -170,13 +171,13 @@ class BusFault(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """The result of a diagnosis: the rules that judged something, and the faults.
+    """The result of a diagnosis of a log or bus: the faults, and which rules could be judged.
 
     Attributes:
-        faults: faults in the order of time.
-        judged: names of the rules that judged something.
-        unjudged: reason why a rule judged nothing, by name of the rule.
-        frames: number of frames.
+        faults: faults in the order of their first violation.
+        judged: names of the rules that could be judged.
+        unjudged: reason why a rule could not be judged, by name of the rule.
+        frames: number of frames in the traffic.
     """
 
     faults: tuple[BusFault, ...]
@@ -186,16 +187,19 @@ class Diagnosis(NamedTuple):
 
 
 class Diagnoser:
-    """Collector of the frames of a source, which judges the frames when all have arrived.
+    """Collector that stores all frames of a log or bus, and then finds the faults in them.
+
+    `canmon check` and `canmon report` use this class. Its rules need no parameters from the user.
 
     Args:
-        bit_rate: bit rate in bits per second, used for the load, or None if unknown.
-        eds: content of EDS files by node-ID.
-        without_errors: reason why the source cannot contain error frames.
-        rules: rules learnt from a good log, or None for no such rules.
+        bit_rate: bit rate in bits per second, from which the bus load is calculated, or None if
+            unknown.
+        eds: objects and values from EDS files, by node-ID.
+        without_errors: reason why the source cannot contain error frames, empty if it can.
+        rules: rules that were learnt from a good log, or None if there are none.
 
     Attributes:
-        kept: frames that arrived.
+        kept: storage with all frames added so far.
     """
 
     def __init__(
@@ -210,18 +214,24 @@ class Diagnoser:
         self.kept = FrameKeeper()
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Add frames in the order of the log, given as a block of columns or as records."""
+        """Store more frames, which must come in the order of the log.
+
+        Args:
+            frames: frames as a block of columns, or one record for each frame.
+        """
         self.kept.take(frames)
 
     def diagnosis(
         self, lost: Iterable[str] = (), errors: Iterable[str] = (), end_us: int = 0
     ) -> Diagnosis:
-        """Judge the frames that have arrived.
+        """Judge all frames stored so far by all rules, and return the faults.
 
         Args:
-            lost: losses that the source reports.
-            errors: errors that the source reports besides error frames.
-            end_us: end of the traffic, in the time of the frames. 0 stands for the last frame.
+            lost: messages of the source about lost frames. Each becomes a fault.
+            errors: messages of the source about bus errors that it did not report as error frames.
+                Each becomes a fault.
+            end_us: end of the traffic in microseconds, on the clock of the frames, or 0 for the
+                time of the last frame.
         """
         faults: list[BusFault] = []
         judged: set[str] = set()

@@ -80,13 +80,14 @@ class FrameSummary(NamedTuple):
 
 
 class NodeSummary(NamedTuple):
-    """The traffic of a node.
+    """Summary of the traffic of one node in a log, from which rules are learnt.
 
     Attributes:
-        row: row of the first frame of the node.
-        identity: values of 1018h in SDO traffic, with None for unknown values.
+        row: index in `BusFrames` of the first frame of the node.
+        identity: vendor-ID, product code, revision and serial number (1018h) from SDO traffic. A
+            value is None if it is unknown.
         emcy: error codes of the node's EMCY messages, such as 8130h.
-        answers: rows of the SDO answers with the identity, by sub-index.
+        answers: indices in `BusFrames` of the SDO answers with the identity, by sub-index of 1018h.
     """
 
     row: int
@@ -97,19 +98,21 @@ class NodeSummary(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BusSummary:
-    """The usual traffic on a bus.
+    """Summary of the traffic on one bus. Rules are learnt from it, or it is compared with them.
+
+    Rows are indices in `BusFrames`.
 
     Attributes:
         name: name of the bus.
-        frames: frames by identifier.
-        nodes: nodes by node-ID.
-        boot_order: node-IDs in the order of the first boot-ups. Nodes that boot within 100 ms are
-            in one group.
-        boots: rows of these first boot-ups.
-        bits_per_second: load of the busiest half second in bits per second.
-        busy: rows of the first and last frame in a half second with too many bits, or else in the
-            busiest half second.
-        found: findings of rules without parameters, as texts.
+        frames: summary of the frames of each CAN-ID, by CAN-ID with flags.
+        nodes: summary of each node, by node-ID.
+        boot_order: node-IDs in the order in which the nodes first booted. Nodes that booted within
+            100 ms form one group.
+        boots: row of the first boot-up of each node, by node-ID.
+        bits_per_second: bus load in the busiest half second, in bits per second.
+        busy: rows of the first and last frame of a half second with more bits than learnt, or
+            otherwise of the busiest half second.
+        found: texts of the faults that the rules without parameters found.
     """
 
     name: str
@@ -154,15 +157,15 @@ class _LearntNode(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LearntBus:
-    """Requirements for a bus; see `BusSummary`.
+    """Rules for one bus that were learnt from a good log, to be compared with a `BusSummary`.
 
     Attributes:
-        frames: requirements for frames by identifier.
+        frames: requirements for the frames of each CAN-ID, by CAN-ID with flags.
         nodes: requirements for nodes by node-ID.
         boot_order: groups of node-IDs in the order of their boot-ups.
-        bits_per_second: largest load in bits per second, or None for no limit.
-        usual: findings that are usual on this bus, and therefore not reported.
-        others: whether other CAN-IDs than those in `frames` are allowed.
+        bits_per_second: largest allowed bus load in bits per second, or None for no limit.
+        usual: texts of faults that also occurred in the good log, and are therefore not reported.
+        others: whether CAN-IDs that are not in `frames` are allowed.
     """
 
     frames: Mapping[int, _LearntFrame]
@@ -192,7 +195,15 @@ def usual_text(hit: Hit) -> str:
 
 
 def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
-    """Return the rules of a bus. If there is only one bus, its name is ignored."""
+    """Return the learnt rules for one bus, or None if there are none.
+
+    If the rules and the traffic both have only one bus, the rules apply even if the names differ.
+
+    Args:
+        learnt: learnt rules by name of the bus.
+        name: name of the bus in the traffic.
+        buses: number of buses in the traffic.
+    """
     if len(learnt) == buses == 1:
         return next(iter(learnt.values()))
     return learnt.get(name)
@@ -202,11 +213,11 @@ def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
 
 
 def learnt_text(summaries: Iterable[BusSummary], head: Sequence[str]) -> str:
-    """Return the rules learnt from a good log as TOML.
+    """Return the text of a TOML file with the rules that are learnt from a good log.
 
     Args:
-        summaries: summaries of all buses of the good log.
-        head: lines of the comment at the beginning of the file.
+        summaries: summaries of the traffic in the good log, one for each bus.
+        head: lines of text for a comment at the beginning of the file.
     """
     lines = [f"# {one}" for one in head]
     for bus in summaries:
@@ -250,12 +261,15 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
 def scanned_text(
     bus: str, nodes: Mapping[int, tuple[Sequence[int | None], int | None]], head: Sequence[str]
 ) -> str:
-    """Return rules as TOML, made from values that were read from nodes.
+    """Return the text of a TOML file with rules that are made from a scan of the nodes on a bus.
+
+    The rules require the identity and the heartbeat of each node. `canmon check` reads the file.
 
     Args:
         bus: name of the bus.
-        nodes: values of 1018h:01 to 04 and producer heartbeat time in ms, by node-ID.
-        head: lines of the comment at the beginning of the file.
+        nodes: vendor-ID, product code, revision and serial number (1018h:01 to 04) and the producer
+            heartbeat time in ms of each node, by node-ID. Unknown values are None.
+        head: lines of text for a comment at the beginning of the file.
     """
     table = f"learnt.{_key(bus)}"
     lines = [f"# {one}" for one in head]
@@ -287,10 +301,15 @@ def _time(us: int) -> str:
 
 
 def parse_learnt(text: str) -> Learnt | None:
-    """Read learnt rules. Return None if the file has other rules.
+    """Parse a TOML file with learnt rules, and return the rules by name of the bus.
+
+    The result is None if the file has no table `learnt`, because it then contains other rules.
+
+    Args:
+        text: text of the file.
 
     Raises:
-        ValueError: the file has an error. The message locates the error.
+        ValueError: the file has an error. The message names the table or key with the error.
     """
     words = load_toml(text)
     if "learnt" not in words:
@@ -425,13 +444,13 @@ def _number(text: str, low: int, high: int, place: str) -> int:
 def broken(
     learnt: LearntBus, bus: BusSummary, frames: BusFrames, times: Sequence[int]
 ) -> Iterator[Hit]:
-    """Yield the violations of the requirements for a bus.
+    """Yield the violations of the learnt rules on one bus.
 
     Args:
-        learnt: requirements for the bus.
-        bus: summary of the bus.
-        frames: all frames of the bus. The last frame is shown if something is missing.
-        times: times of the frames.
+        learnt: learnt rules for the bus.
+        bus: summary of the traffic to judge.
+        frames: all frames of the bus. If something is missing, the violation names the last frame.
+        times: corrected times of these frames in microseconds.
     """
     last_row = len(frames) - 1
     for node in sorted(learnt.nodes.keys() - bus.nodes.keys()):

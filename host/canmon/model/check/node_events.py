@@ -63,11 +63,13 @@ RULES: Final = {
 
 
 class Cut(NamedTuple):
-    """An event that changes the rhythm of frames. Rhythms learnt before it are not valid after it.
+    """An event after which frames may have another rhythm, such as an NMT command or a boot-up.
+
+    The rhythm is measured separately before and after the event.
 
     Attributes:
-        at_us: time of the event.
-        node: node whose frames change, or 0 for all nodes.
+        at_us: time of the event in microseconds.
+        node: node-ID of the node whose frames may change, or 0 for all nodes.
     """
 
     at_us: int
@@ -76,16 +78,20 @@ class Cut(NamedTuple):
 
 @dataclass(slots=True)
 class NodeEvents:
-    """The traffic of one node.
+    """The NMT state, error control frames and SDO identity that were seen of one node in a log.
+
+    Rows are indices in `BusFrames`.
 
     Attributes:
-        heartbeats: rows of error control frames without a request, except boot-ups.
-        answers: rows of error control frames after a request.
-        requested: rows of remote frames for error control.
+        heartbeats: rows of heartbeats, which are error control frames that no remote frame
+            requested.
+        answers: rows of error control frames that a remote frame requested (node guarding).
+        requested: rows of the remote frames that request the state of the node.
         boots: rows of boot-ups.
-        toggled: whether an error control frame had the toggle bit set.
-        state: last reported NMT state, or None before the first report.
-        identity: values read from 1018h, each with the row of its first answer, by sub-index.
+        toggled: whether any error control frame had the toggle bit set.
+        state: NMT state that the node reported last, or None before its first report.
+        identity: values that were read from 1018h, by sub-index, each with the row of its first
+            answer.
     """
 
     heartbeats: list[int] = field(default_factory=list)
@@ -106,11 +112,15 @@ class NodeEvents:
 
 
 def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
-    """Return whether a bus uses the protocol CANopen.
+    """Return whether the frames of a bus appear to be CANopen.
 
-    Other protocols use the same CAN-IDs for other purposes. Therefore each kind of identifier is
-    checked. Frames with the right length and content count for CANopen, other frames count against
-    it.
+    The CAN-IDs alone do not show it, because other protocols use the same CAN-IDs. Therefore the
+    length and content of the frames of each CAN-ID are compared with CANopen. CAN-IDs that fit are
+    weighed against CAN-IDs that do not.
+
+    Args:
+        bus: frames of the bus.
+        rows: indices of the frames of each CAN-ID, by CAN-ID with flags.
     """
     good: Counter[str] = Counter()
     bad = 0
@@ -155,19 +165,22 @@ def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) 
 
 
 class BusEvents:
-    """Analysis of the service frames of a bus, one by one. It collects events and findings.
+    """Analysis of the NMT, error control, EMCY and SDO frames of a bus, one frame after the other.
+
+    The analysis collects the events of each node, and violations of rules.
 
     Args:
         bus: frames of the bus.
-        times: times of the frames.
-        decoder: decoder that reassembles SDO transfers, and learns from them.
-        rows: rows of each identifier.
+        times: corrected times of these frames in microseconds.
+        decoder: decoder that combines SDO frames to transfers, and learns from the transferred
+            values.
+        rows: indices of the frames of each CAN-ID, by CAN-ID with flags.
 
     Attributes:
-        nodes: traffic of each node by node-ID.
-        hits: findings of the analysis.
-        cuts: changes of the rhythm of frames.
-        commanded: whether the log contains an NMT command.
+        nodes: events of each node, by node-ID.
+        hits: violations found so far.
+        cuts: moments at which the rhythm of frames may change.
+        commanded: whether the log contains any NMT command.
     """
 
     def __init__(

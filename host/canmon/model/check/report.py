@@ -36,14 +36,15 @@ def junit(
     unjudged: str = "",
     skipped: Mapping[str, str] = _NONE_SKIPPED,
 ) -> str:
-    """Return the findings as a JUnit report.
+    """Return the findings of a check as a JUnit report in XML, with one test case for each rule.
 
     Args:
-        suite: name of the checked source.
-        names: names of all rules, including those without a violation.
+        suite: name of the test suite, which is the checked log or bus.
+        names: names of all checked rules, including those without a finding.
         findings: findings in their order.
-        unjudged: reason why rules without a finding do not count as passed, empty if they do.
-        skipped: reason why a rule judged nothing, by name of the rule.
+        unjudged: reason why no rule without a finding counts as passed, empty if such rules count.
+        skipped: reason why a rule could not be judged, by name of the rule. The test case of such a
+            rule is marked as skipped.
     """
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:
@@ -74,17 +75,18 @@ def sarif(
     unjudged: str = "",
     skipped: Mapping[str, str] = _NONE_SKIPPED,
 ) -> str:
-    """Return the findings as a SARIF report.
+    """Return the findings of a check as a SARIF report in JSON.
 
-    A finding has no line number, because a log is read as frames. Its time, bus and frame are
-    properties. The frames around it are related locations.
+    A finding has no line number in the report, because a log is read as frames and not as lines.
+    Instead, the report contains its time, bus and frame as properties, and the frames around it as
+    related locations.
 
     Args:
-        source: file or bus that was checked.
-        names: names of all rules.
+        source: path of the log, or name of the bus, that was checked.
+        names: names of all checked rules, including those without a finding.
         findings: findings in their order.
-        unjudged: reason why rules without a finding do not count as passed, empty if they do.
-        skipped: reason why a rule judged nothing, by name of the rule.
+        unjudged: reason why no rule without a finding counts as passed, empty if such rules count.
+        skipped: reason why a rule could not be judged, by name of the rule.
     """
     uri = quote(source.encode("utf-8", "surrogateescape"))
     places = {name: place for place, name in enumerate(names)}

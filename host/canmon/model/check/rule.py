@@ -29,14 +29,16 @@ if TYPE_CHECKING:
 
 
 class TrafficFinding(NamedTuple):
-    """A violation of a rule, with its time and the frame that shows it.
+    """A violation of a rule by the traffic, which a check reports to the user.
 
     Attributes:
-        at_us: time at which the violation was detected.
-        rule: name of the rule.
+        at_us: time in microseconds at which the violation was detected.
+        rule: name of the violated rule.
         text: description of the violation.
-        record: frame that shows the violation, or None if no frame does.
-        around: decoded frames around that time, if they were requested.
+        record: frame that shows the violation, or None if it is not in a single frame, as for a
+            missing frame.
+        around: frames before and after the violation with their meanings, empty if they were not
+            requested.
     """
 
     at_us: int
@@ -60,7 +62,12 @@ class TrafficFinding(NamedTuple):
         return self._line(f"({seconds}.{micros:06d})")
 
     def shown(self, lines: DumpLines | None) -> str:
-        """Return the finding and its frames as text. Without `lines`, times are since the epoch."""
+        """Return the finding as text: one line, and more lines for the frames around the violation.
+
+        Args:
+            lines: formatter for the frames, which also sets the format of times. If it is None,
+                times are written in seconds since the epoch.
+        """
         head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
         if not self.around:
             return head
@@ -81,15 +88,18 @@ NO_GAP_US: Final = -1
 
 
 class FrameSelection(NamedTuple):
-    """Frames of an identifier that a rule must see. Other frames do not change its findings.
+    """Selection of the frames of a CAN-ID that a rule must see to find every violation.
 
-    If no attribute is given, the rule must see all frames.
+    A check in blocks of frames skips all other frames to save time. If no attribute is given, all
+    frames of the CAN-ID are selected. A gap is the time since the previous frame of the CAN-ID.
 
     Attributes:
-        below_us: length of a gap. Frames after a shorter gap are selected.
-        above_us: length of a gap. Frames after a longer gap are selected.
-        first_bytes: values of the first byte of selected frames.
-        firsts: whether to include the first frame of an identifier on a bus.
+        below_us: frames after a gap shorter than this time in microseconds are selected, or None
+            for no such frames.
+        above_us: frames after a gap longer than this time in microseconds are selected, or None for
+            no such frames.
+        first_bytes: frames whose first data byte has one of these values are selected.
+        firsts: whether the first frame of the CAN-ID on each bus is selected.
     """
 
     below_us: int | None = None
@@ -99,11 +109,11 @@ class FrameSelection(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """The frames of an identifier on a bus.
+    """Number of frames of one CAN-ID on one bus, with the times of the first and the last frame.
 
     Attributes:
-        first_us: time of the first frame.
-        last_us: time of the last frame.
+        first_us: time of the first frame in microseconds.
+        last_us: time of the last frame in microseconds.
         frames: number of frames.
     """
 
@@ -118,11 +128,12 @@ class Seen(NamedTuple):
 
 
 class CheckedTraffic(NamedTuple):
-    """The traffic that the rules could judge.
+    """Summary of the checked traffic, from which each rule decides whether it has judged anything.
 
     Attributes:
-        seen: frames of each identifier on each bus, and in addition the error frames.
-        end_us: time when listening ended.
+        seen: number and times of the frames, by name of the bus and CAN-ID with flags. Error frames
+            are included.
+        end_us: time in microseconds at which listening ended.
         without_errors: reason why the source cannot contain error frames, empty if it can.
     """
 
@@ -152,21 +163,22 @@ ONE_TIME: Final = "all frames have one time"
 
 
 class Rule:
-    """Base class of rules.
+    """Base class of the rules that a check applies to each frame, such as `NoEmcy` or `MaxGap`.
 
-    By default, a rule judges all frames of the identifiers that it wants, and reports nothing at
-    the end.
+    By default, a rule judges all frames of the CAN-IDs that it wants, and reports nothing at the
+    end of the traffic.
 
     Attributes:
-        name: name of the rule in findings and reports.
+        name: name of the rule in findings and reports, such as `no-emcy`.
     """
 
     name = ""
 
     def wants(self, ident: int, /) -> bool:
-        """Return whether the rule needs the frames of an identifier.
+        """Return whether the rule must see the frames of a CAN-ID.
 
-        The identifiers of error frames contain `ident.ERROR`.
+        Args:
+            ident: CAN-ID with flags. For error frames, it contains the flag `ident.ERROR`.
         """
         raise NotImplementedError
 
@@ -175,12 +187,12 @@ class Rule:
         return FrameSelection()
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Return the violation in a frame.
+        """Return a description of the violation in a frame, or None if the frame violates nothing.
 
         Args:
-            record: frame to judge.
-            gap_us: time since the previous frame of this identifier on this bus, or None for the
-                first frame.
+            record: frame to judge, whose CAN-ID the rule wants.
+            gap_us: time in microseconds since the previous frame of this CAN-ID on this bus, or
+                None for the first frame.
         """
         raise NotImplementedError
 
@@ -188,13 +200,14 @@ class Rule:
         """Record the time of the first frame of all, before any frame is judged."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Return the reason why the rule has judged nothing. It then does not count as passed.
+        """Return the reason why the rule has judged nothing, so that it does not count as passed.
 
-        A rule has judged something if a frame that it wants has arrived. A rule about error frames,
-        or with its own `end`, also judges the absence of frames.
+        By default, a rule has judged something if a frame that it wants has arrived. Rules about
+        error frames, and rules with their own `end`, always judge something, because they also
+        judge that frames are absent.
 
         Args:
-            evidence: traffic with at least one frame or error frame.
+            evidence: summary of the traffic, which has at least one frame or error frame.
 
         Returns:
             The reason, or an empty text if the rule has judged something.
@@ -222,14 +235,14 @@ class Rule:
 
 
 class MaxLoad:
-    """Rule that limits the load of a bus in each second.
+    """Rule that limits the bus load in each second.
 
     Args:
-        percent: limit of the load, in percent of the bit rate.
+        percent: largest allowed bus load, in percent of the bit rate.
         bit_rate: bit rate in bits per second.
 
     Attributes:
-        name: name of the rule in findings.
+        name: name of the rule in findings and reports.
     """
 
     name = "max-load"
@@ -252,12 +265,12 @@ _REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_
 
 
 class HeartbeatTimes(NamedTuple):
-    """Limits of the time between two heartbeats of a node.
+    """Limits of the time between two successive heartbeats of one node, for the rule `Heartbeat`.
 
     Attributes:
-        node: node-ID of the node.
-        low_us: shortest time since the previous heartbeat.
-        high_us: longest time since the previous heartbeat.
+        node: node-ID of the node that sends the heartbeats.
+        low_us: shortest allowed time between two heartbeats in microseconds.
+        high_us: longest allowed time between two heartbeats in microseconds.
     """
 
     node: int
@@ -266,10 +279,15 @@ class HeartbeatTimes(NamedTuple):
 
 
 class Heartbeat(Rule):
-    """Rule that heartbeats arrive in time. The first one after a boot-up may arrive at any time.
+    """Rule that the heartbeats of one node arrive neither too early nor too late.
+
+    The first heartbeat after a boot-up may arrive at any time.
+
+    Args:
+        times: node-ID, and limits of the time between two heartbeats.
 
     Attributes:
-        name: name of the rule in findings.
+        name: name of the rule in findings and reports, such as `heartbeat 3`.
     """
 
     def __init__(self, times: HeartbeatTimes) -> None:
@@ -379,7 +397,15 @@ class _Watched:
                 self._heartbeats.learn(at_us, transfer)
 
     def hear(self, at_us: int, data: bytes) -> str | None:
-        """Process a frame of error control. Return a finding if a heartbeat before it was lost."""
+        """Process an error control frame of the node.
+
+        The result is a description of the violation if a heartbeat before this frame was lost,
+        otherwise None.
+
+        Args:
+            at_us: time of the frame in microseconds.
+            data: data bytes of the frame.
+        """
         self.has_sent = True
         if data[:1] == _BOOT_UP:
             self._memory.boot()
@@ -438,14 +464,15 @@ class _Watched:
 
 
 class NoLostHeartbeat(Rule):
-    """Rule that no heartbeat of a node that sends heartbeats is lost.
+    """Rule that a node which sends heartbeats does not omit any.
 
-    The period is the value of 1017h in SDO traffic, or else the measured period, or else the value
-    in an EDS. The node board uses the same order. A boot-up restarts the supervision. Answers to
-    guarding requests are not heartbeats, because they have a toggle bit.
+    The expected period comes from 1017h in SDO traffic. If 1017h was not transferred, the measured
+    period is used, or otherwise the value from an EDS file. A boot-up restarts the supervision.
+    Answers to node guarding requests, which have a toggle bit, do not count as heartbeats.
 
     Args:
-        periods_ms: values of 1017h in EDS files, by node-ID. These nodes must be present.
+        periods_ms: producer heartbeat times (1017h) from EDS files, in ms, by node-ID. A node with
+            such a time must send heartbeats.
     """
 
     name = "no-lost-heartbeat"
@@ -456,7 +483,13 @@ class NoLostHeartbeat(Rule):
         self._begin_us: int | None = None
 
     def wants(self, ident: int, /) -> bool:
-        """Return whether the identifier is for error control, or for SDO that may read 1017h."""
+        """Return whether the rule must see the frames of a CAN-ID.
+
+        These are error control frames and SDO frames, because an SDO transfer may contain 1017h.
+
+        Args:
+            ident: CAN-ID with flags.
+        """
         is_sdo = ident in _ANSWER_IDS or ident in _REQUEST_IDS
         return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS
 
@@ -517,10 +550,14 @@ class NoLostHeartbeat(Rule):
 
 
 class MaxGap(Rule):
-    """Rule that frames of an identifier repeat in time.
+    """Rule that limits the time between two successive frames of a CAN-ID.
+
+    Args:
+        ident: CAN-ID with flags.
+        most_us: longest allowed time between two frames in microseconds.
 
     Attributes:
-        name: name of the rule in findings.
+        name: name of the rule in findings and reports, such as `max-gap 181`.
     """
 
     def __init__(self, ident: int, most_us: int) -> None:
@@ -578,9 +615,10 @@ class _CanopenRule(Rule):
 
 
 class NoEmcy(_CanopenRule):
-    """Rule against EMCY messages except error reset, on the default COB-IDs.
+    """Rule that no node sends an EMCY message, except to report that an error is gone (code 0000h).
 
-    Short EMCYs count too.
+    Only the default COB-IDs of EMCY messages are judged. An EMCY message with fewer than 8 bytes is
+    also a violation if it contains the error code.
     """
 
     name = "no-emcy"
@@ -612,9 +650,9 @@ class NoEmcy(_CanopenRule):
 
 
 class NoSdoAbort(_CanopenRule):
-    """Rule against aborted transfers at default SDO servers.
+    """Rule that no SDO transfer at a default SDO server is aborted, by the client or the server.
 
-    An abort that is too short counts too.
+    An abort frame that is too short for an abort code is also a violation.
     """
 
     name = "no-sdo-abort"
@@ -666,10 +704,12 @@ class NoErrorFrames(Rule):
 
 
 class KnownIds(Rule):
-    """Rule that only known identifiers occur. Each other identifier is reported once per bus.
+    """Rule that no CAN-IDs occur except the given ones.
+
+    Any other CAN-ID is reported once on each bus.
 
     Args:
-        idents: allowed identifiers as `ident_of` returns them.
+        idents: allowed CAN-IDs with flags, as `ident_of` returns them.
     """
 
     name = "known"
@@ -703,9 +743,12 @@ _RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMM
 
 
 class NodesPresent(Rule):
-    """Rule that the given nodes are present.
+    """Rule that all given nodes are present. Missing nodes are reported at the end of the traffic.
 
-    A node is present if it has sent a frame with one of its default COB-IDs.
+    A node is present if it has sent at least one frame with one of its default COB-IDs.
+
+    Args:
+        nodes: node-IDs of the nodes that must be present.
     """
 
     name = "nodes"
@@ -730,9 +773,10 @@ class NodesPresent(Rule):
 
 
 class NoReboot(_CanopenRule):
-    """Rule against boot-ups of active nodes without an NMT reset.
+    """Rule that no node boots again unless an NMT command has reset it.
 
-    Any frame that begins with 0 counts as a boot-up, because some nodes send more than one byte.
+    The boot-up of a node that has not sent a frame before is allowed. Any error control frame whose
+    first byte is 0 counts as a boot-up, because some nodes send more than one byte.
     """
 
     name = "no-reboot"

@@ -40,14 +40,14 @@ from tickrig.host.text.values import parse_time_us
 
 
 class RuleScope:
-    """The scope of a rule, which determines whether the rule applies.
+    """The part of a rule that restricts when the rule applies, such as `after sync`.
 
     Args:
-        word: word before the event.
-        event: event that bounds the scope.
+        word: word before the event: `after`, `before` or `while`.
+        event: event that begins or ends the scope, or condition that must be true.
 
     Attributes:
-        text: text of the scope.
+        text: scope as written in the rule, which is the word and the event.
     """
 
     def __init__(self, word: str, event: demands.RuleEvent) -> None:
@@ -168,18 +168,21 @@ _NO_MAPPING: Final = "; PDOs without a known mapping came: describe them by --ed
 
 
 class ExpressionRule:
-    """One rule as an expression. A rule for several nodes is split into one rule for each node.
+    """A rule that was written as an expression, with the state of its check.
 
-    A signal that the rule names must occur in the traffic, because its name may be misspelt. A rule
-    that judges nothing does not count as passed.
+    A rule for several nodes is checked by one object for each node. A signal that the rule names
+    must occur in the traffic, because its name may be misspelt. A rule that judges nothing does not
+    count as passed.
 
     Args:
         name: name of the rule in findings and reports.
-        demand: demand of the rule.
-        scopes: scopes in which the demand applies, empty for always.
-        missing: signals and words that the rule names and that have not occurred yet.
-        slices: missing signals that are bits of frames.
-        mapped: whether the rule is about the contents of PDOs, or names PDOs by number.
+        demand: demand of the rule, such as `every 10ms`.
+        scopes: scopes that restrict when the demand applies. If there are none, it always applies.
+        missing: signals and words in the rule that have not occurred in the traffic yet.
+        slices: signals in the rule that are bits of a frame, such as `181[2:4]`, and have not
+            occurred yet.
+        mapped: whether the rule needs the mapping of PDOs, because it is about their contents, or
+            names PDOs by number.
     """
 
     def __init__(  # noqa: PLR0913 - what a rule is made of
@@ -230,7 +233,13 @@ class ExpressionRule:
         ]
 
     def end(self, end_us: int) -> list[TrafficFinding]:
-        """Return findings about frames that are missing at a time. The rule keeps its state."""
+        """Return the violations that are known only at the end, such as frames that never arrived.
+
+        The method does not change the state of the rule, so that the check may continue.
+
+        Args:
+            end_us: time in microseconds up to which the traffic is judged.
+        """
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
@@ -474,15 +483,16 @@ _OTHERS: Final = frozenset(["not", "!", "!="])
 def errors_alone(
     test: filters.Test, tokens: Iterable[Token], signals: Collection[str]
 ) -> filters.Test:
-    """Return the test of a filter, which EMCYs with code 0000h no longer pass.
+    """Return the test of a filter, changed so that EMCYs with error code 0000h do not pass.
 
-    The test is not changed if the filter does not name `emcy`, has a `not`, or names a signal,
-    such as `emcy and code = 0`.
+    A rule such as `emcy never` should match only errors, and such an EMCY reports that an error is
+    gone. The test is returned unchanged if the filter does not contain the word `emcy`, contains
+    `not`, or names a signal, as in `emcy and code = 0`.
 
     Args:
-        test: test of the filter.
-        tokens: words of the filter.
-        signals: signals that the filter names.
+        test: function that returns whether a frame passes the filter.
+        tokens: words and signs of the filter.
+        signals: names of the signals in the filter.
     """
     words = {token.text for token in tokens}
     if signals or _EMCY not in words or words & _OTHERS:
@@ -543,9 +553,9 @@ class _RuleParser(_QuantityParser):
     def rule(
         self,
     ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[_Slice]]:
-        """Return demand, scopes, signals and slices of a rule.
+        """Parse the whole rule, and return its demand, scopes, signals and slices.
 
-        Raise RuleError for any other text.
+        Raise RuleError if the text is not a rule.
         """
         self._named: set[str] = set()
         demand = self._demand(self._subject())
@@ -676,11 +686,11 @@ class _RuleParser(_QuantityParser):
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A parsed rule.
+    """A parsed rule that was written as an expression, such as `tpdo1 of 3-4 every 10ms`.
 
     Attributes:
         name: name of the rule in findings and reports.
-        texts: text of the rule for each node that it applies to.
+        texts: text of the rule for each node. A rule that does not depend on the node has one text.
     """
 
     name: str
@@ -700,14 +710,15 @@ def _made(name: str, text: str) -> ExpressionRule:
 
 
 def parse_rule(text: str, name: str = "") -> Expression:
-    """Parse a rule.
+    """Parse a rule that is written as an expression, such as `181 every 10ms`.
 
     Args:
         text: text of the rule.
-        name: name of the rule in findings, or empty to use the text of the rule.
+        name: name of the rule in findings and reports. If it is empty, the text of the rule is
+            used.
 
     Raises:
-        RuleError: the text is not a rule. The message names the column.
+        RuleError: the text is not a rule. The message names the column of the error.
     """
     demand, *_ = _RuleParser(text).rule()
     name = name or " ".join(text.split())

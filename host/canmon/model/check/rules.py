@@ -73,10 +73,12 @@ class Rules:
         return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
     def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
-        """Return a new `Rule` object for each rule that judges single frames.
+        """Return a new `Rule` object for each rule that judges frames without their meaning.
+
+        A rule object keeps the state of one check, so that each check needs new objects.
 
         Args:
-            eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+            eds_heartbeats: producer heartbeat times (1017h) from EDS files, in ms, by node-ID.
         """
         made: list[Rule] = []
         made += [rule.NoEmcy()] * self.no_emcy
@@ -92,9 +94,13 @@ class Rules:
         return made
 
     def load(self, bit_rate: int | None) -> rule.MaxLoad | None:
-        """Return the rule about the load.
+        """Return the rule that limits the bus load, or None if there is no limit.
 
-        Raise ValueError if the bit rate that it needs is missing.
+        Raise ValueError if there is a limit, but the bit rate is unknown.
+
+        Args:
+            bit_rate: bit rate of the bus in bits per second, or None to use the bit rate of the
+                rules.
         """
         if self.max_load is None:
             return None
@@ -139,15 +145,15 @@ def _no_rule(name: str) -> Callable[[], Rule]:
 
 
 def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
-    """Read rules.
+    """Return the rules that are given by name, as in a TOML file or on the command line.
 
     Args:
-        words: texts of the rules.
-        load_rule: function that returns the factory of a rule of another package, by its name under
-            `rule`.
+        words: values of the rules by name of the rule, such as `no_emcy`.
+        load_rule: function that returns the factory of a rule from an installed package, by the
+            name of that rule.
 
     Raises:
-        ValueError: a rule is unknown or has an invalid value.
+        ValueError: a rule is unknown, or its value is invalid.
 
     >>> parse_rules({"no_emcy": True, "heartbeat": ["3=100ms±20%"]}).heartbeats
     (HeartbeatTimes(node=3, low_us=80000, high_us=120000),)
@@ -179,7 +185,9 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
 
 
 def joined(first: RuleValues, second: RuleValues) -> RuleValues:
-    """Return the rules of both sets. A number in the second set replaces the number in the first.
+    """Return the rules of two sets, such as those of a file and those of the command line.
+
+    Lists of both sets are joined. For other rules, the value of the second set replaces the first.
 
     >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
     {'known': ['181', '182'], 'max_load': 60}
@@ -297,14 +305,15 @@ def _idents(text: str) -> Iterator[int]:
 
 
 def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
-    """Return the rules of a file by their names.
+    """Parse a TOML file with rules, and return the value of each rule by its name.
 
     Args:
         text: text of the whole file.
-        load_rule: function as for `parse_rules`.
+        load_rule: function that returns the factory of a rule from an installed package, by the
+            name of that rule.
 
     Raises:
-        ValueError: the file has mistakes. The message names each mistake with its line.
+        ValueError: the file has mistakes. The message describes each mistake and names its line.
     """
     try:
         words = load_toml(text)
