@@ -52,7 +52,14 @@ _MARK: Final = "\x01"
 
 
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return texts as an array of numbers, so that many texts can be looked up at once."""
+    """Return an array of numbers, each of which contains the characters of one text.
+
+    Such an array is a lookup table from which the texts of many rows are taken at once by index.
+
+    Args:
+        texts: ASCII texts, none longer than a number of the array.
+        dtype: numpy data type of the numbers, such as `<u4` for texts of up to four characters.
+    """
     size = np.dtype(dtype).itemsize
     return np.array([text.encode() for text in texts], f"S{size}").view(dtype)
 
@@ -91,7 +98,13 @@ def joined(count: int, parts: Sequence[Part]) -> str:
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
-    """Return rows that contain one text where the mask is set, and the other text elsewhere."""
+    """Return an array of characters with one of two texts in each row.
+
+    Args:
+        rows: mask that selects the text of each row.
+        text: text of the rows for which the mask is True.
+        other: text of all other rows.
+    """
     width = max(len(text), len(other))
     both = np.array([other, text], f"S{width}")
     return of(both[:, np.newaxis])[rows.astype(np.int8)]
@@ -104,10 +117,10 @@ def of_few(values: npt.NDArray[Any], write: Callable[[int], str]) -> Cells:
 
 
 class Texts:
-    """The texts for the rows of a block, which are empty at first.
+    """The text of each frame in a block, such as its meaning. At first, all texts are empty.
 
     Args:
-        count: number of rows.
+        count: number of frames in the block.
     """
 
     def __init__(self, count: int) -> None:
@@ -117,7 +130,13 @@ class Texts:
         self._wide: dict[int, str] = {}
 
     def put(self, rows: npt.NDArray[np.int64], texts: Cells) -> None:
-        """Set the texts of some rows. No text may be empty. A single text is used for all rows."""
+        """Set the texts of some rows.
+
+        Args:
+            rows: indices of the rows.
+            texts: one text for each of these rows, or a single text for all of them. No text may be
+                empty.
+        """
         if texts.shape[1] <= _WIDEST:
             self._pieces.append((rows, texts))
             return
@@ -130,7 +149,11 @@ class Texts:
 
     @cached_property
     def cells(self) -> Cells:
-        """The texts as rows of characters, with a mark for a wide text, and zeros for no text."""
+        """The texts as an array of characters, with one row for each text.
+
+        Empty texts and the ends of short texts are filled with zeros. A text that is too wide for
+        the array is represented by a mark.
+        """
         pieces = list(self._pieces)
         for found in (self._single, dict.fromkeys(self._wide, _MARK)):
             if found:
@@ -154,11 +177,13 @@ class Texts:
 
 
 class TextTable:
-    """A table of texts for numbers with few bits. A text is written when its number first occurs.
+    """Cache of the texts for small numbers, such as node-IDs.
+
+    Each text is made when its number first occurs.
 
     Args:
-        bits: number of bits of each number.
-        write: function that writes one number.
+        bits: number of bits of the largest possible number.
+        write: function that returns the text of a number.
     """
 
     def __init__(self, bits: int, write: Callable[[int], str]) -> None:
@@ -239,14 +264,17 @@ def _digits(numbers: npt.NDArray[np.int64]) -> Cells:
 
 
 class Scale(NamedTuple):
-    """The conversion of a whole number to a float: raw * factor + offset.
+    """Conversion of an integer in a frame to a physical value: raw * factor + offset.
+
+    The conversion is also stored with integers only, so that the decimal digits of a value can be
+    calculated exactly.
 
     Attributes:
         factor: factor of the conversion.
         offset: offset of the conversion.
-        tens: power of ten that makes factor and offset whole numbers.
-        times: factor multiplied by `tens`.
-        more: offset multiplied by `tens`.
+        tens: power of ten by which factor and offset are multiplied to become integers.
+        times: factor multiplied by `tens`, an integer.
+        more: offset multiplied by `tens`, an integer.
     """
 
     factor: float
@@ -271,9 +299,17 @@ class Scale(NamedTuple):
 
 
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
-    """Convert whole numbers to floats, and write the floats as text.
+    """Return the physical values of many integers as texts, as `str` writes floats.
 
-    Return the texts, and a mask of the rows whose text is correct.
+    The texts are calculated with integers, which does not give the right text for every value. The
+    caller writes the other values one by one.
+
+    Args:
+        numbers: integers from the frames.
+        scale: conversion of the integers to physical values.
+
+    Returns:
+        The parts of the texts, and a mask that is True where the text is right.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

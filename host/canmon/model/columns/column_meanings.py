@@ -65,10 +65,13 @@ _MOST_LAYOUTS: Final = 1 << 10
 
 
 class ColumnMeanings:
-    """Decoder of blocks of frames.
+    """Decoder that returns the meanings of whole blocks of frames, with numpy.
+
+    The texts are the same as those of the decoder for single frames.
 
     Args:
-        decoder: decoder of single frames. Other code may use it between two blocks.
+        decoder: decoder for single frames, which contains what is known about the nodes. It may
+            decode other frames between two blocks.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -313,7 +316,13 @@ class _Lessons:
         self._boots = np.sort(np.concatenate(boots)) if boots else np.empty(0, np.int64)
 
     def next(self, begin: int) -> int:
-        """Return the first row that can change a meaning, or the number of frames if none can."""
+        """Return the next row whose frame can change the meaning of a CAN-ID or an object.
+
+        If there is no such row, return the number of frames.
+
+        Args:
+            begin: row at which the search starts.
+        """
         end = len(self._idents)
         found = np.searchsorted(self._answers, begin)
         if found < len(self._answers):
@@ -686,13 +695,15 @@ _PIECE: Final = 1 << 10
 
 
 class ColumnNodes:
-    """Updates a node board from blocks of frames. The final result is that of single frames.
+    """Updates a node board from blocks of frames, with numpy, for `canmon nodes`.
 
-    `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
+    After the last block, the board has the same state as after all frames one by one. An exception
+    is `NodeStatus.pdos`, which contains only the PDOs that affect this state. The command does not
+    show it.
 
     Args:
-        decoder: decoder for which `standard` is true.
-        board: node board. No other code may feed the board.
+        decoder: decoder for single frames. Its attribute `standard` must be True.
+        board: node board to update. No other code may update it.
     """
 
     def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
@@ -731,13 +742,13 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Expedited SDO transfers without new information. Each answer directly follows its request.
+    """Pairs of an expedited SDO request and its immediate answer, from which nothing is learnt.
 
     Attributes:
-        requests: positions of the requests.
-        answers: positions of the answers.
-        inner: whether another such exchange of the node directly precedes it, and one directly
-            follows it. The exchange can then be skipped without effect.
+        requests: rows of the requests.
+        answers: rows of the answers, in the same order.
+        inner: whether a pair lies between two pairs of the same node, directly after one and before
+            another. Such a pair can be skipped without effect.
     """
 
     requests: Ints
@@ -775,20 +786,21 @@ def exchanges(
     payload: npt.NDArray[np.uint64],
     blocks: npt.NDArray[np.bool_],
 ) -> Exchanges:
-    """Return the exchanges in SDO frames of the pre-defined connection set.
+    """Find the pairs of an SDO request and its answer that can be counted instead of decoded.
 
-    A client that polls a node causes most SDO frames of a log. Of several such exchanges in a row,
-    the inner ones only add to the count.
+    Most SDO frames of a log come from a client that polls a node. In a series of such pairs, only
+    the first and the last must be decoded.
 
-    Exchanges that are never left out are reads of 1000h to 1FFFh, a statusword that differs from
-    the previous one, and all exchanges of a node with block transfers, whose segments may contain
-    any data.
+    Some pairs are never left out: reads of the objects 1000h to 1FFFh, a statusword that differs
+    from the previous one, and all pairs of a node with block transfers, because the segments of a
+    block may contain any data.
 
     Args:
-        ident: identifiers with flags of SDO frames only.
-        dlc: number of data bytes.
+        ident: CAN-IDs with flags. All frames must be SDO frames of the pre-defined connection set.
+        dlc: number of data bytes of each frame.
         payload: data of each frame as a little-endian number.
-        blocks: whether a node has block transfers, as `block_nodes` returns it, by node-ID.
+        blocks: whether a node uses block transfers, indexed by node-ID, as `block_nodes` returns
+            it.
     """
     nodes = (ident & 0x7F).astype(np.uint8)
     order = np.argsort(nodes, kind="stable")
@@ -837,10 +849,10 @@ def of_sdo(ident: npt.NDArray[Any]) -> Ints:
 
 
 class Matter(NamedTuple):
-    """The frames that can change what is known about nodes and CAN-IDs.
+    """Rows of a block whose frames must be decoded one by one, because they add knowledge.
 
     Attributes:
-        rows: rows of frames that can change the knowledge about nodes.
+        rows: rows of frames that can change what is known about nodes.
         settling: rows of frames that can change the meaning of a CAN-ID.
     """
 
@@ -849,12 +861,15 @@ class Matter(NamedTuple):
 
 
 def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Matter:
-    """Find the frames that can change the knowledge about nodes.
+    """Find the frames of a block that can change what is known about nodes or CAN-IDs.
+
+    Only these frames must be decoded one by one. All others can be processed together.
 
     Args:
-        bus: decoder of the bus.
-        frames: frames of one bus.
-        but: rows to leave out, which are frames that do not change the state of PDOs.
+        bus: decoder for single frames of this bus, which contains what is known so far.
+        frames: block of frames of one bus.
+        but: rows that need not be decoded, because their frames do not change the state of PDOs, or
+            None.
     """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

@@ -93,13 +93,24 @@ class _Objects:
 
 
 class BlfBlocks:
-    """Parser of BLF containers, called with their content and the start of the log in s."""
+    """Parser for the containers of a BLF log, which reads all frames of a container at once.
+
+    An object is called with the content of a container and the start time of the log in seconds.
+
+    Args:
+        channels: numbers of the buses, shared by all containers of the log.
+    """
 
     def __init__(self, channels: ChannelNames) -> None:
         self._channels = channels
 
     def __call__(self, data: bytes, start_s: float) -> can_log.BlfBlock | None:
-        """Return the frames, or None if the frames must be read one by one."""
+        """Return the frames of a container, or None if they must be read one by one.
+
+        Args:
+            data: uncompressed content of the container.
+            start_s: start time of the log in seconds since the epoch.
+        """
         found = _alike(data) or _aligned(data) or _anywhere(data)
         if found is None:
             return None
@@ -420,27 +431,33 @@ _ITEMS: Final = 1 << 10
 
 
 def read_columns(path: Path) -> ColumnReader:
-    """Return a reader of a log file. The file is not opened yet.
+    """Return a reader that yields a log file in blocks of frames as numpy arrays.
+
+    The file is opened when the iteration over the reader starts.
+
+    Args:
+        path: path of the log file, whose suffix determines the format.
 
     Raises:
-        LogFormatError: the name of the file indicates no format.
+        LogFormatError: the name of the file has no suffix of a known format.
     """
     return ColumnReader(path, log_file.log_format(path))
 
 
 class ColumnReader:
-    """An iterable of blocks of a log, which reads the file during the iteration, and only once.
+    """Reader of a log file that yields blocks of frames as numpy arrays.
 
-    The reader holds one block in memory, regardless of the size of the file.
+    The file is opened when the iteration starts. A reader can be iterated only once. It holds one
+    block in memory, regardless of the size of the file.
 
     Attributes:
-        tally: counts of items that are not frames.
+        tally: counts of items in the log that are not returned as frames, such as invalid lines.
 
     Raises:
-        OSError: during iteration: the file cannot be read.
-        LogError: during iteration: the content does not match the name of the file, or has more
-            than 256 buses.
-        NoColumnsError: during iteration: the log contains a CAN FD frame.
+        OSError: the file cannot be read. This is raised during the iteration.
+        LogError: the content does not match the suffix of the file, or the log has more than 256
+            buses. This is raised during the iteration.
+        NoColumnsError: the log contains a CAN FD frame. This is raised during the iteration.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -454,10 +471,10 @@ class ColumnReader:
             yield rows.columns(self._channels)
 
     def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Yield the file in pieces, as columns. A piece with marks is a list of frames and marks.
+        """Yield the log in pieces, including marks and CAN FD frames, which columns cannot contain.
 
-        Pieces with CAN FD frames, and formats that cannot be read as columns, are lists of frames,
-        too.
+        Most pieces are blocks of columns. A piece is a list of single frames and marks if it
+        contains a mark or a CAN FD frame, or if the format of the log cannot be read as columns.
         """
         if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()

@@ -128,12 +128,15 @@ _TWO_BYTES: Final = 2 << 2 | sdo_frame.SIZE_INDICATED
 
 
 def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
-    """Return the rows of answers that begin or end a transfer from which the decoder may learn.
+    """Return the rows of SDO answers from which the decoder may learn something about the node.
+
+    These answers begin or end the transfer of an object such as a PDO mapping. They must be decoded
+    one by one.
 
     Args:
         frames: frames of one bus.
-        rows: rows of the answers of a server.
-        memory: memory of the node of the server.
+        rows: rows of the answers that one SDO server sends.
+        memory: known objects of the node with this server.
     """
     words = frames.payload[rows]
     index = (words >> np.uint64(8) & np.uint64(0xFFFF)).astype(np.int64)
@@ -150,7 +153,15 @@ def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
 
 
 def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
-    """Return whether the decoder may learn from a value of an object, as in `teachers`."""
+    """Return whether the decoder may learn something from the transferred value of an object.
+
+    Such values are those of communication objects, such as COB-IDs and PDO mappings, and that of
+    the statusword until 16 bits of it were seen.
+
+    Args:
+        entry: index and sub-index of the object.
+        memory: known objects of the node.
+    """
     return entry[0] in TEACHING or (entry == STATUSWORD and not memory.has_statusword)
 
 
@@ -195,13 +206,13 @@ class _Frames(NamedTuple):
 
     @classmethod
     def of(cls, frames: Columns, rows: Ints, places: Ints, side: _Sides) -> _Frames:
-        """Find the pairs of request and answer.
+        """Return the SDO frames of a bus, in which each request is paired with its answer.
 
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: row of each frame in the texts.
-            side: channel, node and sender of each frame.
+            places: index of each frame in the block for which texts are written.
+            side: SDO channel, node-ID and direction of each frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]
@@ -259,10 +270,10 @@ class _Part(NamedTuple):
 
 
 class ColumnSdo:
-    """Decoder of the SDO frames of a bus, block after block.
+    """Decoder for the SDO frames of a bus that processes whole blocks of frames, with numpy.
 
     Args:
-        bus: decoder of single frames. Other code may use it between two blocks.
+        bus: decoder for single frames of this bus. It may decode other frames between two blocks.
     """
 
     def __init__(self, bus: BusDecoder) -> None:
@@ -278,13 +289,14 @@ class ColumnSdo:
         places: Ints,
         texts: cells.Texts,
     ) -> None:
-        """Decode SDO frames from which the decoder learns nothing.
+        """Write the meanings of SDO frames that do not change what is known about any node.
 
         Args:
             frames: frames of the bus.
-            speakers: channel, whether its client sends, and rows of the frames, of each sender.
-            places: row of each frame in the texts.
-            texts: texts to which the decoded frames are added.
+            speakers: SDO channel, True for frames of the client or False for frames of the server,
+                and rows of these frames, for each sender.
+            places: index in `texts` of each frame.
+            texts: texts of the block, to which the meanings are added.
         """
         known = self._bus.version
         if known != self._known or len(self._texts) + len(self._writers) > _MOST_TEXTS:

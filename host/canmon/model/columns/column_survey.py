@@ -52,11 +52,12 @@ _Values = npt.NDArray[np.float64]
 
 
 class ColumnSurvey:
-    """Updates a survey from blocks of frames.
+    """Updates a survey of a log from blocks of frames, with numpy, for `canmon report` and graphs.
 
     Args:
-        decoder: decoder of the survey. Its `first` decoders may only be DBC files.
-        survey: survey to feed. No other code may feed the survey.
+        decoder: decoder for single frames that the survey uses. Its decoders in `first` may only be
+            DBC files.
+        survey: survey to update. No other code may update it.
     """
 
     def __init__(self, decoder: Decoder, survey: Survey) -> None:

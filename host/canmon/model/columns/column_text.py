@@ -128,22 +128,22 @@ def log_lines(columns: Columns) -> str:
 
 
 class ScreenText:
-    """Writer that makes the lines of `DumpLines` for many frames at once, used alternately with it.
+    """Writer for the lines of `canmon dump` that writes whole blocks of frames at once, with numpy.
 
     Args:
-        lines: writer of single frames.
+        lines: writer for single frames with the same settings. Both may be used alternately.
     """
 
     def __init__(self, lines: frames.DumpLines) -> None:
         self._lines = lines
 
     def texts(self, columns: Columns, meanings: cells.Texts | None = None) -> Iterator[str]:
-        """Write frames, each line with its end.
+        """Yield the lines of a block of frames as text. Each line ends with a line break.
 
         Args:
             columns: frames to write.
-            meanings: text after each frame, empty for no text. None if no frame has a
-                text.
+            meanings: text that follows each frame, such as its meaning, empty for no text. If it is
+                None, no frame is followed by a text.
         """
         for begin in range(0, len(columns), _SLAB):
             rows = slice(begin, begin + _SLAB)
@@ -208,10 +208,10 @@ class ScreenText:
 
 
 class ColumnText:
-    """Block of at least one frame for a writer of a log; see `TextBlock`.
+    """A block of frames that a log writer can write as lines of text at once; see `TextBlock`.
 
     Args:
-        columns: frames to write.
+        columns: frames to write, at least one.
     """
 
     def __init__(self, columns: Columns) -> None:

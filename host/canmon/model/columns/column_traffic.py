@@ -54,12 +54,14 @@ _STUFFED: Final = np.array(can.STUFFED, np.int64)
 def column_bits(
     ident: npt.NDArray[np.uint32], dlc: npt.NDArray[np.uint8], payload: npt.NDArray[np.uint64]
 ) -> _Ints:
-    """Return the number of bits of each frame, with stuff bits and interframe space.
+    """Return the number of bits of each frame on the bus, from which the load is calculated.
+
+    Stuff bits and the interframe space are included.
 
     Args:
-        ident: identifiers as `ident_of` returns them.
-        dlc: data length codes, also of remote frames.
-        payload: data bytes as a little-endian number. Missing bytes are 0.
+        ident: CAN-IDs with flags, as `ident_of` returns them.
+        dlc: data length code of each frame, also for remote frames.
+        payload: data of each frame as a little-endian number. Missing bytes are 0.
     """
     out = np.empty(len(ident), np.int64)
     for begin in range(0, len(ident), _BLOCK):
@@ -234,11 +236,14 @@ class _ColumnGaps:
 
 
 def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
-    """Return the bucket of each time, as `bucket_of` does.
+    """Return for each time the number of its histogram bucket, as `bucket_of` does for one time.
 
-    A bucket is the exponent and the first bits of the mantissa of a floating-point number. Both
-    values are read from the bits of that number. If a time is too long for an exact conversion, its
-    low bits are cleared first, so that the time is not rounded up.
+    The number consists of the exponent and the first mantissa bits of the time as a floating-point
+    number. A time that is too long for an exact conversion is rounded down first, so that it does
+    not fall into the next bucket.
+
+    Args:
+        times_us: times in microseconds.
     """
     exact = np.where(times_us >> _MANTISSA_BITS, times_us & _COARSE, times_us)
     bits = exact.astype(np.float64).view(np.int64) >> _MANTISSA_BITS - SUB_BITS
@@ -328,7 +333,10 @@ def _planes(counts: Ints) -> list[tuple[int, ...]]:
 
 
 class ColumnTraffic:
-    """Counter of all frames of all buses. Its memory grows with the identifiers, not the frames."""
+    """Traffic statistics for all buses of a log, calculated from blocks of frames with numpy.
+
+    The memory grows with the number of CAN-IDs, not with the number of frames.
+    """
 
     def __init__(self) -> None:
         self._buses: dict[str, _ColumnBus] = {}

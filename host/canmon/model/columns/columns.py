@@ -32,21 +32,22 @@ Ints = npt.NDArray[np.int64]
 
 
 class NoColumnsError(ValueError):
-    """A log cannot be read as columns because it contains CAN FD. Read it frame by frame."""
+    """Raised if a log with CAN FD frames is read as columns. Read such a log frame by frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Frames as columns, in the order of the log.
+    """A block of frames in the order of the log, stored as one numpy array for each property.
 
     Attributes:
-        at_us: end of each frame in microseconds.
-        ident: identifier of each frame. Bit 31 is extended, bit 30 remote, bit 29 error frame.
+        at_us: time of the end of each frame in microseconds.
+        ident: CAN-ID of each frame with flags: bit 31 for an extended frame, bit 30 for a remote
+            frame, and bit 29 for an error frame.
         dlc: data length code of each frame, 0 to 8.
         payload: data of each frame as a little-endian number, padded with zeros.
         sent: whether the recorder sent the frame.
-        channel: index of the bus in `channels`.
-        channels: names of the buses, in the order in which they appeared.
+        channel: index in `channels` of the bus of each frame.
+        channels: names of the buses, in the order of their first frames.
     """
 
     at_us: npt.NDArray[np.int64]
@@ -87,11 +88,12 @@ class ChannelNames:
 
 
 class Rows:
-    """Columns in which some frames are still unknown.
+    """A block of frames that is filled row by row while a log is parsed, and becomes `Columns`.
 
     Attributes:
-        at_us, ident, dlc, payload, sent, channel: columns as in `Columns`, with 0 in unknown rows.
-        known: whether each row holds a frame.
+        at_us, ident, dlc, payload, sent, channel: arrays as in `Columns`. Rows that are not filled
+            yet contain 0.
+        known: whether a row is filled with a frame.
     """
 
     def __init__(self, count: int) -> None:
@@ -122,7 +124,13 @@ class Rows:
         return rows
 
     def put(self, row: int, record: Record, channel: int) -> None:
-        """Write one row. Raise NoColumnsError if a CAN FD frame does not fit into the row."""
+        """Fill a row with a frame. Raise NoColumnsError for a CAN FD frame.
+
+        Args:
+            row: index of the row.
+            record: frame, with its time.
+            channel: index of the bus.
+        """
         frame = record.frame
         if isinstance(frame, FdFrame):
             raise NoColumnsError("CAN FD")
@@ -146,7 +154,11 @@ def select(columns: Columns, rows: Ints | slice) -> Columns:
 
 
 def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
-    """Return each bus that has frames, in the order of the names, with its rows and its frames."""
+    """Split a block of frames by bus. Buses without a frame in the block are left out.
+
+    Returns:
+        The name, the row indices and the frames of each bus, sorted by name.
+    """
     present = np.flatnonzero(np.bincount(columns.channel)).tolist()
     if len(present) == 1:
         return [(columns.channels[present[0]], np.arange(len(columns)), columns)]
@@ -180,15 +192,18 @@ _NO_IDENT: Final = 0xFFFF_FFFF
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Rows sorted by identifier. The rows of an identifier keep their order, and form a run.
+    """The rows of a block sorted by CAN-ID.
+
+    The rows of one CAN-ID keep their order. Together they are called a run.
 
     Attributes:
-        order: rows in the sorted order.
-        begins: start of each run in `order`.
-        ends: end of each run in `order`, which is the index after its last row.
-        numbers: number of each run's identifier.
-        fresh: whether a run begins with the first frame of its identifier.
-        gaps_us: gap before each row of `order`, or 0 before a first frame or if time goes back.
+        order: row indices in the sorted order.
+        begins: index in `order` of the first row of each run.
+        ends: index in `order` after the last row of each run.
+        numbers: number that `Identifiers` gave to the CAN-ID of each run.
+        fresh: whether a run contains the first frame of its CAN-ID in the whole log.
+        gaps_us: time in microseconds since the previous frame of the CAN-ID, for each row in
+            `order`. It is 0 for the first frame, and if the time decreases.
     """
 
     order: Ints
@@ -204,17 +219,23 @@ class Runs:
         return self.ends - self.begins
 
     def sums(self, values: Ints) -> Ints:
-        """Return the sum of values of each run. The values are in the order of `order`."""
+        """Return the sum of some values for each run.
+
+        Args:
+            values: one value for each row, sorted as in `order`.
+        """
         return np.add.reduceat(values, self.begins)
 
 
 class Identifiers:
-    """The identifiers of a bus, numbered by first appearance. The numbers sort blocks of frames.
+    """The CAN-IDs of a bus, numbered in the order of their first frames.
+
+    With these numbers, `take` sorts one block of frames after the other by CAN-ID.
 
     Attributes:
-        idents: identifiers by number.
-        first_us: time of the first frame of each identifier.
-        last_us: time of the last frame of each identifier.
+        idents: CAN-IDs with flags, indexed by number.
+        first_us: time of the first frame of each CAN-ID in microseconds, indexed by number.
+        last_us: time of the last frame of each CAN-ID in microseconds, indexed by number.
     """
 
     def __init__(self) -> None:
@@ -276,13 +297,13 @@ def grown(column: Numbers, count: int) -> Numbers:
 
 
 class ColumnLoad:
-    """Sum of the bits of each second, counted from the first frame.
+    """Bus load in each second, counted from the first frame, for blocks of frames.
 
     Args:
-        first_us: time of the first frame.
+        first_us: time of the first frame in microseconds.
 
     Attributes:
-        load: the resulting load.
+        load: bus load calculated so far.
     """
 
     def __init__(self, first_us: int) -> None:
