@@ -23,14 +23,15 @@ class DbcError(ValueError):
 
 
 class DbcFile:
-    """Decoder of the CAN-IDs in a DBC file, which takes precedence over all other decoders.
+    """Decoder for the frames that a DBC file describes. It takes precedence over other decoders.
 
     Args:
-        path: path of the file, in UTF-8, or otherwise in Windows-1252.
+        path: path of the DBC file, which is in UTF-8 or Windows-1252.
 
     Raises:
         OSError: the file cannot be read.
-        DbcError: the file is malformed, or the extra `dbc` is not installed.
+        DbcError: the file is malformed, or the extra `dbc` with the package cantools is not
+            installed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -66,7 +67,11 @@ class DbcFile:
         return self._messages[can_id, extended]
 
     def decode(self, record: Record) -> Decoded | None:
-        """Return the signals of a frame, or None if the file does not name its CAN-ID."""
+        """Return the meaning of a frame, or None if the DBC file has no message with its CAN-ID.
+
+        Args:
+            record: frame, with its bus and time.
+        """
         frame = record.frame
         if isinstance(frame, ErrorFrame):
             return None

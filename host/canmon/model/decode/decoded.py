@@ -101,7 +101,16 @@ class Transfer:
     def described(  # noqa: PLR0913, PLR0917 - all that is known
         self, name: str, value: Value | None, text: str, length: str, unit: str, source: str
     ) -> Transfer:
-        """Return the transfer with name, value and unit of its object. `replace` would be slow."""
+        """Return a copy of the transfer with the name, value and unit of the transferred object.
+
+        Args:
+            name: name of the object.
+            value: value that was transferred, or None if it is unknown.
+            text: value as text, as in `Signal.text`.
+            length: text about an unusual length, empty if the length is usual.
+            unit: unit of the value.
+            source: source of the name, as in `Decoded.source`.
+        """
         return Transfer(
             self.at_us,
             self.duration_us,
@@ -168,15 +177,15 @@ DBC: Final = "dbc"
 
 
 class Signal(NamedTuple):
-    """A value of a frame.
+    """A named value in a frame, such as an object mapped to a PDO, or a signal of a DBC file.
 
     Attributes:
-        name: name of an object in lower case, with a dot before the member of a record. An object
-            without a name has index and sub-index, such as `6041h:00`. For a DBC file, it is the
-            name in that file.
+        name: name of the object in lower case. The name of a record member follows after a dot. An
+            object without a known name is called by index and sub-index, such as `6041h:00`. For a
+            DBC file, it is the name of the signal in that file.
         value: value of the signal.
-        unit: unit in the EDS or DBC file, otherwise empty.
-        text: the value as text, if it differs from the value.
+        unit: unit of the value from the EDS or DBC file, empty if there is none.
+        text: value as text, such as the name of a state, or empty if the plain value is shown.
     """
 
     name: str

@@ -122,21 +122,23 @@ class Effect(IntEnum):
 
 
 class BusDecoder:
-    """Decoder of the frames of one bus, in the order of their arrival.
+    """Decoder for the frames of one bus, which learns from the frames how to decode later ones.
 
-    The pre-defined connection set defines the CAN-IDs until an EDS or SDO traffic changes them
-    (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
+    At first, the CAN-IDs have the meanings of the pre-defined connection set. An EDS file or SDO
+    traffic may change them, for example by a new COB-ID or PDO mapping (1005h, 1012h, 1014h,
+    1201h.., 1400h.. to 1A00h..).
 
     Args:
-        eds: content of EDS files by node-ID.
-        files: source of files for other nodes, or None for no search.
-        channel: name of the bus for that search.
+        eds: objects and values from EDS files, by node-ID.
+        files: EDS files that are chosen by the identity of further nodes, or None for none.
+        channel: name of the bus, used in messages about chosen files.
 
     Attributes:
-        changes: number of possible changes of the meaning of a CAN-ID.
-        renamed: number of possible changes of the description of an object.
-        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set got another meaning.
-        guarded: nodes whose next frame of error control answers a guarding request.
+        changes: counter that grows whenever the meaning of a CAN-ID may have changed.
+        renamed: counter that grows whenever the description of an object may have changed.
+        sdo_moved: whether a CAN-ID that the pre-defined connection set uses for SDO has another
+            meaning.
+        guarded: node-IDs of nodes that were sent a guarding request, and have not answered yet.
     """
 
     def __init__(
@@ -179,10 +181,13 @@ class BusDecoder:
         return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
 
     def lasting(self, can_id: int) -> Route | None:
-        """Return the decoder of a CAN-ID, or None if the meaning depends on earlier frames.
+        """Return the function that decodes a CAN-ID, if its frames can be decoded independently.
 
-        The decoder is valid until `changes` grows. The meaning of error control, SDO and
-        multiplexed PDOs depends on earlier frames.
+        The result is None for error control, SDO and multiplexed PDOs, because their meaning
+        depends on earlier frames. The function is valid until `changes` grows.
+
+        Args:
+            can_id: CAN-ID with 11 bits.
         """
         route = self._routed(can_id)
         told = route.func if isinstance(route, partial) else route
@@ -200,9 +205,13 @@ class BusDecoder:
         return self.changes + self.renamed
 
     def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
-        """Return the channel of a CAN-ID with SDO frames, and whether its client sends them.
+        """Return the SDO channel that a CAN-ID belongs to, or None if it has no SDO frames.
 
-        The result is valid until `changes` grows.
+        The result also contains whether the frames are sent by the client. It is valid until
+        `changes` grows.
+
+        Args:
+            can_id: CAN-ID with 11 bits.
         """
         route = self._routed(can_id)
         if not isinstance(route, partial) or route.func != self._sdo:
@@ -218,14 +227,24 @@ class BusDecoder:
         return int(route.args[0])
 
     def answers_guarding(self, node: int) -> bool:
-        """Return whether a node answers guarding requests.
+        """Return whether a node answers node guarding requests.
 
-        A node with a producer heartbeat time does not (CiA 301, error control).
+        A node with a producer heartbeat time (1017h) does not, because CiA 301 does not allow both.
+
+        Args:
+            node: node-ID of the node.
         """
         return not self.memory(node).number(*node_memory.HEARTBEAT_TIME)
 
     def guard(self, node: int, *, requested: bool) -> None:
-        """Record whether the last frame of error control of a node was a guarding request."""
+        """Record whether the latest error control frame of a node was a guarding request.
+
+        This is needed to decode the next frame, which is then the answer of the node.
+
+        Args:
+            node: node-ID of the node.
+            requested: whether the latest frame was a guarding request.
+        """
         if requested:
             self.guarded.add(node)
         else:
@@ -296,7 +315,12 @@ class BusDecoder:
         return self.sdo_step(node, take(at_us, frame.data))
 
     def sdo_step(self, node: int, step: SdoStep) -> Decoded:
-        """Return a decoded SDO frame of a node, and learn from the transfers that it ended."""
+        """Return the meaning of an SDO frame, and learn from the transfers that it ended.
+
+        Args:
+            node: node-ID of the SDO server.
+            step: effect of the frame on the transfer, as `SdoChannel` returns it.
+        """
         if not step.ended:
             return Decoded(
                 *("sdo", node, step.text, (), "", step.entry), asks=step.asks, flaw=step.flaw
@@ -427,10 +451,16 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 
 
 def data_that_counts(route: Route) -> int:
-    """Return a mask of the data bits on which the text of a frame depends.
+    """Return a mask of the data bits that affect the meaning of the frames of a CAN-ID.
 
-    The data are a little-endian number. If the mask is 0, the text does not depend on the length
-    either.
+    Frames that are equal in these bits have the same meaning, so that only one of them must be
+    decoded. If the mask is 0, the number of data bytes does not matter either.
+
+    Args:
+        route: function that decodes the frames of the CAN-ID.
+
+    Returns:
+        The mask, for data that are read as a little-endian number.
     """
     told = route.func if isinstance(route, partial) else route
     if told in (_unmapped, _raw):
@@ -452,21 +482,24 @@ class FrameDecoder(Protocol):
 
 
 class Decoder:
-    """Decoder of frames in order. Each bus has its own nodes.
+    """Decoder for the frames of any number of buses, which must come in the order of their times.
+
+    It learns from the frames how to decode later ones. Each bus has its own nodes.
 
     Args:
-        eds: path or content of an EDS or DCF by node-ID, valid on every bus. `EdsFiles` with a
-            folder also has files of other nodes, chosen by the identity in the traffic.
-        dbc: DBC files, which take precedence for their CAN-IDs.
-        first: decoders that are tried before all others.
+        eds: EDS or DCF files by node-ID, each as a path or as its content. They apply to every bus.
+            If it is an `EdsFiles` object with a folder, the files of further nodes are chosen by
+            the identity in the traffic.
+        dbc: paths of DBC files, which take precedence for the CAN-IDs that they describe.
+        first: decoders that are tried before all others, such as those of installed packages.
 
     Attributes:
-        first: decoders that are tried first, followed by the DBC files.
+        first: decoders that are tried before all others, followed by those of the DBC files.
 
     Raises:
         OSError: a file cannot be read.
         EdsError: an EDS is malformed.
-        DbcError: a DBC file is malformed, or cantools is not installed.
+        DbcError: a DBC file is malformed, or the package cantools is not installed.
     """
 
     def __init__(

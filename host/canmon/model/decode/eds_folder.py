@@ -46,12 +46,12 @@ _MAJOR: Final = 16
 
 
 class EdsIdentity(NamedTuple):
-    """Vendor, product and revision of a device (1018h).
+    """Identity of a device (1018h), by which the EDS file for a node is chosen.
 
     Attributes:
         vendor: vendor-ID (object 1018h:01).
         product: product code (object 1018h:02).
-        revision: revision number (object 1018h:03), or None if unknown.
+        revision: revision number (object 1018h:03), or None if it is unknown.
     """
 
     vendor: int
@@ -64,7 +64,13 @@ class EdsIdentity(NamedTuple):
 
 
 def node_identity(values: Sequence[int | None]) -> EdsIdentity | None:
-    """Return the identity from 1018h:01 to 03, or None if vendor or product is unknown."""
+    """Return the identity of a node from the values of 1018h that it sent.
+
+    The result is None if vendor or product is unknown, because no EDS file can then be chosen.
+
+    Args:
+        values: vendor-ID, product code and revision number (1018h:01 to 03), each None if unknown.
+    """
     vendor, product, revision = values
     return None if vendor is None or product is None else EdsIdentity(vendor, product, revision)
 
@@ -185,17 +191,19 @@ def _candidate(path: Path) -> _Candidate | None:
 
 
 class EdsFiles(dict[int, EdsObjects]):
-    """Content of EDS files by node-ID. The files of other nodes are chosen from a folder.
+    """Contents of the EDS files of all nodes, as a dictionary by node-ID.
 
-    A chosen file is added, so that the names in the file are known from then on.
+    If a node without a file reports its identity (1018h), a file for it is chosen from a folder,
+    and added to the dictionary.
 
     Args:
-        given: files of given nodes. The folder is not searched for these nodes.
-        folder: folder with files of other nodes, or None for no folder.
-        notify: function that is called with a line of text about each choice.
+        given: contents of the files that the user has assigned to nodes. No other file is chosen
+            for these nodes.
+        folder: folder from which the files of other nodes are chosen, or None for no folder.
+        notify: function that is called with a message about each choice.
 
     Attributes:
-        folder: folder with files of other nodes, or None for no folder.
+        folder: folder from which the files of other nodes are chosen, or None for no folder.
     """
 
     def __init__(
@@ -210,14 +218,15 @@ class EdsFiles(dict[int, EdsObjects]):
         self._said: dict[tuple[str, int], tuple[Path | None, str]] = {}
 
     def find(self, channel: str, node: int, identity: EdsIdentity) -> EdsObjects | None:
-        """Return the content of the file that fits a node.
+        """Choose the EDS file for a node by its identity, and return the content of the file.
 
-        The result is None if no file fits, or if the file for the node is already chosen.
+        The result is None if no file fits or can be read, if the same file was already chosen, or
+        if the user has assigned a file to the node.
 
         Args:
             channel: name of the bus.
             node: node-ID of the node.
-            identity: identity that the node reports.
+            identity: identity that the node has reported (1018h).
         """
         if self.folder is None or node in self._given:
             return None

@@ -219,15 +219,15 @@ def _word_test(name: str, sign: str, value: str) -> Test:
 
 
 def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
-    """Return the test for a signal or a bit of a signal.
+    """Return a function that returns whether a signal in a frame fulfils a comparison.
 
-    Without a comparison, the signal must not be 0.
+    The default comparison is `!= 0`. A frame without the signal does not fulfil any comparison.
 
     Args:
-        path: name of the signal, optionally with `node.` before it, and `.` with the name or number
-            of a bit after it.
+        path: name of the signal, such as `position`, `3.position` for a node, or `statusword.fault`
+            or `statusword.3` for a bit.
         sign: comparison operator, one of `COMPARISONS`.
-        text: value to compare with.
+        text: value with which the signal is compared.
     """
     find, compare = signal_reader(path), comparison(sign, text)
 
@@ -239,12 +239,12 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
 
 
 def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
-    """Return a function that finds a signal, or one of its bits, in a frame.
+    """Return a function that returns a signal in a decoded frame, or one bit of it.
 
     The function returns None if the frame does not contain the signal.
 
     Args:
-        path: name of the signal, as for `signal_test`.
+        path: name of the signal or bit, as for `signal_test`.
     """
     if match := _STATE.fullmatch(path):
         return _state_reader(int(match[1]))
@@ -274,7 +274,9 @@ def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
 
 
 def signal_place(path: str) -> tuple[int | None, str, int | None]:
-    """Return node, name and bit of a signal in a filter, with None for a node or bit not named.
+    """Split the name of a signal in a filter into node-ID, signal name and bit number.
+
+    The node-ID is None if no node is named. The bit number is None if no bit is named.
 
     >>> signal_place("3.statusword.fault"), signal_place("position")
     ((3, 'statusword', 3), (None, 'position', None))
@@ -287,7 +289,9 @@ def signal_place(path: str) -> tuple[int | None, str, int | None]:
 
 
 def number(text: str) -> float | None:
-    """Parse a number in any notation. Return None if the text is not a number.
+    """Parse a number as written in filters, or return None if the text is not a number.
+
+    Decimal and hexadecimal numbers are allowed, also with an `h` at the end.
 
     >>> number("0x10"), number("-1.5"), number("8130h"), number("fast")
     (16, -1.5, 33072, None)
@@ -306,12 +310,14 @@ def number(text: str) -> float | None:
 
 
 def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
-    """Return a function that compares a signal, by its number or its text.
+    """Return a function that returns whether a signal fulfils a comparison with a given value.
+
+    If the given value is a number, the number of the signal is compared, otherwise its text.
 
     Args:
-        sign: comparison operator from `COMPARISONS`, or from `_EQUALITIES` if the text is not a
-            number.
-        text: value to compare with.
+        sign: comparison operator from `COMPARISONS`. If the value is not a number, only the
+            operators from `_EQUALITIES` are allowed.
+        text: value with which signals are compared.
     """
     wanted, compare = number(text), COMPARISONS[sign]
     if wanted is None:
@@ -336,13 +342,13 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Signals and words of filters that have not occurred in the traffic yet.
+    """Collector of the signals and words in filters that have not occurred in the traffic yet.
 
-    The words are those that no built-in decoder produces.
+    Those that never occur are reported to the user, because they may be misspelt.
 
     Args:
-        paths: names of signals as in filters: `position`, `3.position`, `statusword.fault`.
-        words: fields and words as in `Filter.words`.
+        paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
+        words: words that no built-in decoder produces, each with its field, as in `Filter.words`.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -422,11 +428,11 @@ _SHOWN: Final = 200
 
 
 class FilterError(ValueError):
-    """A text that is not a filter.
+    """Raised if a text is not a valid filter. The message names the column of the error.
 
     Attributes:
-        what: description of what the text should be.
-        column: column of the error, from 1.
+        what: name of the expected text in the message, such as `filter`.
+        column: column of the error. The first column is 1.
     """
 
     what = "filter"
@@ -664,13 +670,15 @@ def _hexadecimal(text: str) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """A parsed filter.
+    """A parsed filter, which selects frames by CAN-ID, node, kind or the values of signals.
 
     Attributes:
-        text: text of the filter.
-        matches: function that returns whether a frame passes.
-        signals: names of the signals in the filter, used to report signals that never occur.
-        words: field and word for each word that only a decoder of an installed package can produce.
+        text: filter as the user has written it.
+        matches: function that returns whether a frame passes the filter.
+        signals: names of the signals in the filter, so that signals that never occur can be
+            reported.
+        words: words in the filter that only the decoder of an installed package can produce, each
+            with its field.
     """
 
     text: str
@@ -680,10 +688,13 @@ class Filter:
 
 
 def parse_filter(text: str) -> Filter:
-    """Read a filter.
+    """Parse a filter of the user, as in the option `-F`.
+
+    Args:
+        text: filter in the language of this module, or in the notation of candump.
 
     Raises:
-        FilterError: the text is not a filter. The message contains the column.
+        FilterError: the text is not a filter. The message names the column of the error.
     """
     try:
         chosen = CandumpFilter.parse(text)

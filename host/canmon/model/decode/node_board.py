@@ -143,7 +143,10 @@ class NodeStatus:
 
     @property
     def state_text(self) -> str:
-        """The NMT state as text. A later commanded state of the master follows after an arrow."""
+        """The NMT state of the node as text, such as `operational`, or `?` if it is unknown.
+
+        If the master has since commanded another state, that state follows after an arrow.
+        """
         told = "?" if self.state is None else nmt_state_name(self.state)
         if self.commanded in (None, self.state):
             return told
@@ -217,16 +220,17 @@ _ERROR_CONTROL: Final = ("heartbeat", "guard")
 
 
 class NodeBoard:
-    """The status of every node that sends frames.
+    """The status of all nodes, updated with each decoded frame, as in `canmon nodes`.
 
-    A node is on the board from its first reported state, EMCY or answer to an SDO request. It is
-    also on the board from its first PDO, if the PDO is known to be its own, or has a CAN-ID of the
-    pre-defined connection set without another meaning. A node with an EDS is on the board from the
+    A node is added when it first reports its NMT state, sends an EMCY, or answers an SDO request.
+    It is also added with its first PDO, if the PDO is known to belong to the node, or if its CAN-ID
+    has the meaning of the pre-defined connection set. A node with an EDS file is added at the
     beginning.
 
     Args:
-        decoder: decoder of the frames that the board processes.
-        expected: nodes with an EDS, which belong to the first bus with a frame.
+        decoder: decoder of the frames, from which the known objects of the nodes are taken.
+        expected: names of the nodes with an EDS file, by node-ID. They are added to the first bus
+            with a frame.
     """
 
     def __init__(self, decoder: Decoder, expected: Mapping[int, str] | None = None) -> None:
@@ -321,13 +325,13 @@ _HEADS: Final = ("NODE", "NAME", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", 
 
 
 def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list[str]:
-    """Return the board as lines, with a table and the latest EMCYs below it.
+    """Return the node board as lines of text: a table of the nodes, and the latest EMCYs below.
 
     Args:
-        board: board with the nodes.
-        now_us: time to which ages refer.
+        board: board with the status of the nodes.
+        now_us: current time in microseconds, used for the age of entries.
         width: number of columns of the terminal.
-        height: number of lines that may be used.
+        height: largest number of lines to return.
     """
     rows = board.rows()
     several = len({row.channel for row in rows}) > 1
@@ -389,14 +393,14 @@ def _emcy(row: NodeStatus) -> str:
 def emcy_history(
     rows: Sequence[NodeStatus], stamp: Stamp = Stamp.ABSOLUTE, origin_us: int = 0
 ) -> list[str]:
-    """Return lines of text: an empty line, a header, and the EMCYs of all nodes, the latest first.
+    """Return the EMCYs of all nodes as lines of text, from the latest to the oldest.
 
-    Without EMCYs, the function returns no lines.
+    An empty line and a header come first. If there are no EMCYs, the list is empty.
 
     Args:
-        rows: nodes with their EMCYs.
-        stamp: format of times.
-        origin_us: time of the first frame.
+        rows: status of each node, with its EMCYs.
+        stamp: format in which times are written.
+        origin_us: time of the first frame in microseconds.
     """
     found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
     before = [origin_us, *(at_us for at_us, _, _ in found)]
@@ -460,7 +464,13 @@ class _PdoContent(NamedTuple):
 
 
 def pdo_contents(row: NodeStatus) -> list[_PdoContent]:
-    """Return the known PDOs of a node. The PDOs that the node sends come first."""
+    """Return the known PDOs of a node with their CAN-IDs and mapped objects, for display.
+
+    PDOs that the node sends precede PDOs that it receives.
+
+    Args:
+        row: status of the node.
+    """
     memory, found = row.memory, list[_PdoContent]()
     for pdo in sorted(pdos_of(row.node, memory.indices)):
         can_id, count = can_id_of(pdo, memory), memory.number(pdo.mapping, 0)
@@ -488,7 +498,14 @@ def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:
 
 
 def maker_text(row: NodeStatus) -> str:
-    """Return vendor and product in short, as names if a file has them, or else as numbers."""
+    """Return the vendor and product code of a node as a short text.
+
+    The vendor is the name in an EDS file, or otherwise the number. A mark is added if the values
+    come only from the EDS file.
+
+    Args:
+        row: status of the node.
+    """
     vendor, product = row.memory.number(_IDENTITY, 1), row.memory.number(_IDENTITY, 2)
     words = [row.memory.eds.vendor or ("" if not vendor else f"{vendor:08X}h")]
     words += [f"{product:08X}h"] if product else []
@@ -498,15 +515,24 @@ def maker_text(row: NodeStatus) -> str:
 
 
 def name_text(row: NodeStatus) -> str:
-    """Return the name of a node, with a mark if the name is from the EDS and not from the node."""
+    """Return the device name of a node as text.
+
+    A mark is added if the name comes from an EDS file, because the node itself has not sent it.
+
+    Args:
+        row: status of the node.
+    """
     name, told = row.known_name, row.memory.was_received(_DEVICE_NAME)
     return name + _FROM_EDS * bool(name and not told)
 
 
 def told_identity(row: NodeStatus) -> str:
-    """Return the identity read from the node, followed by further values of its EDS.
+    """Return the identity of a node as text: values that the node sent, then further EDS values.
 
-    The serial number in an EDS is left out, because it belongs to no real device.
+    The serial number in an EDS file is left out, because it is not that of the real device.
+
+    Args:
+        row: status of the node.
     """
     memory = row.memory
 

@@ -70,15 +70,15 @@ _OTHERS: Final = re.compile(r"[^0-9a-z]+")
 
 
 class ObjectText(NamedTuple):
-    """The description of an object.
+    """Description of an object, by which its value is decoded and shown.
 
     Attributes:
-        name: name as in `Signal.name`.
-        kind: data type of the object, or None if unknown.
-        unit: unit of the object, empty if unknown.
-        factor: factor that converts the number to the unit.
-        source: source as in `Decoded.source`.
-        in_hex: whether to write the value in hex, because it is a set of bits or an identifier.
+        name: name of the object, as in `Signal.name`.
+        kind: data type of the object, or None if it is unknown.
+        unit: unit of the value, empty if there is none.
+        factor: factor by which the raw number is multiplied to get the value in this unit.
+        source: source of the description, as in `Decoded.source`.
+        in_hex: whether the value is shown in hexadecimal, as for bit fields and identifiers.
     """
 
     name: str = ""
@@ -89,12 +89,12 @@ class ObjectText(NamedTuple):
     in_hex: bool = False
 
     def fitted(self, data: bytes, *, sized: bool = True) -> bytes:
-        """Return the bytes of the value, without surplus bytes of the SDO transfer.
+        """Return the bytes of an object's value, without surplus bytes from an SDO transfer.
 
         Args:
-            data: bytes in the transfer.
-            sized: whether the transfer indicated the number of bytes. If not, surplus bytes have no
-                meaning. If so, surplus bytes are dropped only if they are padding.
+            data: bytes that were transferred.
+            sized: whether the transfer indicated the number of bytes. If it did, surplus bytes are
+                removed only if they are padding. Otherwise, all surplus bytes are removed.
         """
         kind = self.kind
         if kind is None or not 0 < kind.size < len(data):
@@ -105,9 +105,14 @@ class ObjectText(NamedTuple):
         return value if filled or not sized else data
 
     def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
-        """Return value and text of some bytes, after a call of `fitted`.
+        """Decode the bytes of an object's value, and return the value and its text.
 
-        The data type is ignored if the bytes do not fit it.
+        Surplus bytes are removed first, as by `fitted`. If the bytes do not fit the data type, they
+        are decoded without it.
+
+        Args:
+            data: bytes that were transferred.
+            sized: whether the transfer indicated the number of bytes.
         """
         data = self.fitted(data, sized=sized)
         if self.kind is not None and not self.in_hex:
@@ -192,7 +197,7 @@ _IN_HEX: Final = {
 
 
 def describe_standard(index: int, sub: int) -> ObjectText | None:
-    """Return the description of an object in CiA 301, or None if there is none.
+    """Return the description of an object that CiA 301 defines, or None for any other object.
 
     >>> describe_standard(0x1801, 5).name, describe_standard(0x6041, 0)
     ('tpdo2.event_timer', None)
@@ -217,7 +222,14 @@ def describe_standard(index: int, sub: int) -> ObjectText | None:
 
 
 def describe_drive(index: int, sub: int) -> ObjectText | None:
-    """Return the description of an object in CiA 402 for a drive with one axis, or None."""
+    """Return the description of an object that CiA 402 defines for a drive with one axis.
+
+    The result is None for any other object.
+
+    Args:
+        index: index of the object.
+        sub: sub-index of the object.
+    """
     is_known = index >= _PROFILES and index in _VARIABLES and sub == 0
     return _standard_text(*_VARIABLES[index]) if is_known else None
 
@@ -237,14 +249,14 @@ def _standard_text(name: str, kind: DataType) -> ObjectText:
 
 @dataclass(frozen=True, slots=True)
 class EdsObjects:
-    """The content of an EDS file for a node.
+    """The content of an EDS file for one node: descriptions and power-on values of its objects.
 
     Attributes:
-        texts: name, type and unit of each object, by index and sub-index.
-        values: power-on values as bytes on the wire, by index and sub-index.
-        name: name of the device, empty if the file has none.
-        findings: errors in the file. Objects with errors are not used.
-        vendor: name of the vendor, empty if the file has none.
+        texts: description of each object, by index and sub-index.
+        values: power-on value of each object as little-endian bytes, by index and sub-index.
+        name: product name of the device. If the file contains none, it is the name of the file.
+        findings: errors in the file. Objects with errors are left out.
+        vendor: name of the vendor, empty if the file contains none.
     """
 
     texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
@@ -260,7 +272,11 @@ class EdsObjects:
 
 
 def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
-    """Read an EDS or DCF for a node.
+    """Read an EDS or DCF file for a node, and return its objects with the node-ID inserted.
+
+    Args:
+        path: path of the file.
+        node_id: node-ID by which `$NODEID` in the file is replaced.
 
     Raises:
         OSError: the file cannot be read.
@@ -273,7 +289,14 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
 def eds_objects(
     device: EdsDevice, node_id: int, name: str, findings: tuple[Finding, ...] = ()
 ) -> EdsObjects:
-    """Return the content of an EDS for a node. `name` is used for a device without a name."""
+    """Return the objects of a device from an EDS file that has already been read.
+
+    Args:
+        device: device as read from the file.
+        node_id: node-ID by which `$NODEID` in the power-on values is replaced.
+        name: name for a device without a product name in the file.
+        findings: errors in the file.
+    """
     return EdsObjects(
         {(row.index, row.sub): _text(device, row) for row in device.entries},
         {
@@ -311,17 +334,18 @@ Entry = tuple[int, int]
 
 
 class NodeMemory:
-    """The known values of a node's objects.
+    """Everything that is known about the objects of one node, from SDO traffic and an EDS file.
 
-    A written value is valid until the node boots. After that the earlier values are valid again,
-    unless the node has stored the written ones (1010h).
+    A written value is valid until the node boots. Then the earlier value is valid again, unless the
+    node was commanded to store its parameters (1010h).
 
     Args:
-        eds: content of the node's EDS file. The power-on values are valid until traffic shows other
-            values.
+        eds: content of the node's EDS file, or None. Its power-on values are valid until the
+            traffic contains other values.
 
     Attributes:
-        has_statusword: whether 16 bits of 6041h were seen, in SDO or as mapped to a PDO.
+        has_statusword: whether a statusword (6041h) with 16 bits was seen, in an SDO transfer or in
+            the mapping of a PDO.
     """
 
     def __init__(self, eds: EdsObjects | None = None) -> None:
@@ -356,7 +380,13 @@ class NodeMemory:
             self.has_statusword = True
 
     def learn(self, transfer: decoded.Transfer) -> bool:
-        """Store the value of a transfer that ended. Return False if it has no usable value."""
+        """Store the value of a completed SDO transfer. Return whether it had a usable value.
+
+        Failed or incomplete transfers, and transfers with an inconsistency, have no usable value.
+
+        Args:
+            transfer: transfer that has ended.
+        """
         entry, data = transfer.entry, transfer.data
         if (
             entry is None
@@ -393,9 +423,15 @@ class NodeMemory:
         return entry in self._now
 
     def source(self, index: int) -> str:
-        """Return the source of the values of an object.
+        """Return where the values of an object come from: SDO traffic, an EDS file, or neither.
 
-        The source is traffic if traffic contained a value.
+        If any value of the object was seen in the traffic, the source is the traffic.
+
+        Args:
+            index: index of the object.
+
+        Returns:
+            A source as in `Decoded.source`, empty if no value is known.
         """
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
         if any(entry in self._now for entry in entries):
@@ -409,10 +445,10 @@ class NodeMemory:
 
     @property
     def is_drive(self) -> bool:
-        """Whether the node is a CiA 402 drive.
+        """Whether the node is a drive according to CiA 402.
 
-        The device type decides. If it is unknown or has several profiles, the node is a drive if it
-        has 6041h:00 with 16 bits.
+        The device type (1000h) determines it. If the device type is unknown, or stands for several
+        profiles, the node is a drive if it has a statusword (6041h:00) with 16 bits.
         """
         device_type = self.number(*DEVICE_TYPE)
         # 1000h: profile in the low half; FFFFh above it stands for several of them (CiA
@@ -422,7 +458,14 @@ class NodeMemory:
         return device_type & 0xFFFF == _DRIVE_PROFILE
 
     def describe(self, index: int, sub: int) -> ObjectText:
-        """Return the description of an object. The words of a drive have the names of CiA 402."""
+        """Return the description of an object, from an EDS file, or else from CiA 301 or CiA 402.
+
+        If the node is a drive, words such as the statusword have the names of CiA 402 in any case.
+
+        Args:
+            index: index of the object.
+            sub: sub-index of the object.
+        """
         told, standard = self.eds.texts.get((index, sub)), describe_standard(index, sub)
         if told is None:
             told = standard
@@ -441,19 +484,21 @@ _GAPS_KEPT: Final = 9
 
 @dataclass(slots=True)
 class Heartbeats:
-    """The times of the heartbeats of a node, and their period.
+    """Supervision of the heartbeats of one node, which determines their period and detects a loss.
 
     Args:
-        memory: known objects of the node.
-        from_boot: whether to learn the period also from the gap between a boot-up and the first
-            heartbeat.
+        memory: known objects of the node, which may contain 1017h.
+        from_boot: whether the time between a boot-up and the first heartbeat also counts as a
+            period.
 
     Attributes:
-        last_us: time of the last reported state, or None before the first report.
-        since_us: time since which a heartbeat is expected, or None for never.
-        gaps: gaps between the latest heartbeats in us. A delayed node sends all pending heartbeats
-            at once. Therefore a gap shorter than half of the previous gap is averaged with the
-            previous gap, which restores the period after such a burst.
+        last_us: time of the latest report of the NMT state in microseconds, or None before the
+            first one.
+        since_us: time in microseconds from which the next heartbeat is awaited, or None if none is
+            awaited.
+        gaps: times between the latest heartbeats in microseconds. A delayed node sends all pending
+            heartbeats at once. Therefore a gap shorter than half of the previous gap is averaged
+            with that gap, which restores the period.
     """
 
     memory: NodeMemory = field(compare=False)
@@ -476,7 +521,11 @@ class Heartbeats:
 
     @property
     def period_us(self) -> int | None:
-        """The period from 1017h in traffic, or else the measured period, or that of the EDS."""
+        """The period of the heartbeats in microseconds, or None if it is unknown.
+
+        The value of 1017h in SDO traffic takes precedence. Without it, the measured period is used,
+        or otherwise the value of 1017h in an EDS file.
+        """
         if self.gaps and not self.by_sdo:
             return _median(self.gaps)
         period_ms = self.memory.number(*HEARTBEAT_TIME)
@@ -502,7 +551,13 @@ class Heartbeats:
             self.since_us = at_us
 
     def take(self, at_us: int, *, learns: bool = True) -> None:
-        """Process a heartbeat. The period is learnt from it, unless it may answer a request."""
+        """Process a heartbeat of the node, and measure the period with it.
+
+        Args:
+            at_us: time of the heartbeat in microseconds.
+            learns: whether to measure the period. It is False for a frame that may be the answer to
+                a guarding request.
+        """
         learns = learns and (self.from_boot or not self._booted)
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
             self._take_gap(at_us - self.last_us)
@@ -524,11 +579,13 @@ PAIR_US: Final = 100_000
 
 
 class TwoBeats(NamedTuple):
-    """Two interleaved heartbeats with the same period. Each sends every second frame.
+    """Two heartbeats with the same CAN-ID and period, as sent by two nodes with the same node-ID.
+
+    The frames of the two heartbeats alternate.
 
     Attributes:
-        period_us: period of one heartbeat.
-        places: positions of the gaps between one heartbeat and the other.
+        period_us: period of each of the two heartbeats in microseconds.
+        places: indices of the gaps from a frame of one heartbeat to a frame of the other.
     """
 
     period_us: int

@@ -28,16 +28,18 @@ _Convert = Callable[[int], Value]
 
 
 class Field(NamedTuple):
-    """The position of a signal in a frame, and its conversion.
+    """Position of a signal in the data of a PDO, and the conversion of its bits to a value.
+
+    The data are read as a little-endian number.
 
     Attributes:
         name: name of the signal.
-        shift: number of the lowest bit of the signal.
-        mask: mask of the signal's bits, shifted to bit 0.
-        sign: sign bit of the signal, or 0 if the signal has no sign.
-        convert: function that converts the number to the value, or None if the number is the value.
-        unit: unit as in `Signal.unit`.
-        write: function that writes the value as text, or None if the text is the value.
+        shift: number of the signal's lowest bit in the data.
+        mask: mask with a 1 for each bit of the signal, starting at bit 0.
+        sign: mask of the sign bit, or 0 if the signal is unsigned.
+        convert: function that converts the number to the value, or None if no conversion is needed.
+        unit: unit of the value, as in `Signal.unit`.
+        write: function that returns the value as text, or None if the plain value is shown.
     """
 
     name: str
@@ -50,16 +52,16 @@ class Field(NamedTuple):
 
 
 class PdoDecoder:
-    """Decoder of the frames of one PDO.
+    """Decoder for the frames of one PDO, made from its mapping.
 
     Args:
-        pdo: kind, node and source as in `Decoded`.
-        fields: signals of the PDO, empty if the mapping is unknown.
+        pdo: kind, node and source of the decoded frames, as in `Decoded`.
+        fields: signals that are mapped to the PDO, empty if the mapping is unknown.
         bits: number of mapped bits.
-        note: note for users about the mapping.
+        note: remark about the mapping that is shown with each frame, or empty.
 
     Attributes:
-        size: number of mapped bytes.
+        size: number of data bytes according to the mapping.
     """
 
     def __init__(
@@ -175,7 +177,10 @@ _Layout = PdoDecoder | _MpdoLayout
 
 
 class NodePdo(NamedTuple):
-    """One PDO of one node. In sorted order, PDOs that the node sends come first."""
+    """Identification of one PDO of one node.
+
+    When sorted, PDOs that nodes send (TPDOs) precede PDOs that nodes receive (RPDOs).
+    """
 
     receives: bool
     node: int
@@ -205,14 +210,29 @@ class PdoTable:
         self._can_ids: dict[NodePdo, int] = {}
 
     def layout(self, can_id: int) -> _Layout | None:
-        """Return the PDO with a CAN-ID. A PDO that is sent precedes a PDO that is received."""
+        """Return the mapping of the PDO with a CAN-ID, or None if no PDO has it.
+
+        If one node sends a PDO with this CAN-ID and others receive it, the mapping of the sender is
+        returned.
+
+        Args:
+            can_id: CAN-ID with 11 bits.
+        """
         claims = self._by_can_id.get(can_id)
         # `NodePdo` sorts those that are sent first, so a TPDO names the fields of a shared
         # CAN-ID.
         return claims[min(claims)] if claims else None
 
     def update(self, pdo: NodePdo, memory: NodeMemory) -> set[int]:
-        """Update what is known about a PDO. Return the CAN-IDs whose meaning may have changed."""
+        """Update the CAN-ID and mapping of a PDO after an object of its node has changed.
+
+        Args:
+            pdo: PDO to update.
+            memory: known objects of the node.
+
+        Returns:
+            CAN-IDs whose meaning may have changed.
+        """
         before = self._can_ids.pop(pdo, None)
         if before is not None:
             del self._by_can_id[before][pdo]
@@ -239,7 +259,14 @@ def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
 
 
 def can_id_of(pdo: NodePdo, memory: NodeMemory) -> int | None:
-    """Return the CAN-ID of a PDO, or None if it is not valid or not known."""
+    """Return the CAN-ID of a PDO, or None if the PDO is not valid or its CAN-ID is unknown.
+
+    Without a known COB-ID, the CAN-ID is that of the pre-defined connection set.
+
+    Args:
+        pdo: PDO to look up.
+        memory: known objects of its node.
+    """
     cob_id = memory.number(pdo.parameter, 1)
     if cob_id is not None:
         return None if cob_id & (INVALID | EXTENDED) else cob_id & CAN_ID_MASK

@@ -413,14 +413,15 @@ def _end(running: _OpenTransfer, end: sdo_frame.BlockEnd) -> str:
 
 
 class SdoStep(NamedTuple):
-    """The effect of one SDO frame.
+    """The effect of one SDO frame on the transfer that it belongs to.
 
     Attributes:
-        text: step of the transfer, if no transfer ended with the frame.
-        entry: index and sub-index of the object in the frame, if known.
+        text: description of the frame, if no transfer ended with it.
+        entry: index and sub-index of the transferred object, or None if unknown.
         ended: transfers that ended with the frame.
-        asks: whether the client waits for an answer to the frame.
-        flaw: inconsistency that the frame adds to its transfer.
+        asks: whether the client waits for an answer after the frame.
+        flaw: description of an inconsistency that the frame caused, such as a wrong toggle bit, or
+            empty.
     """
 
     text: str
@@ -431,14 +432,14 @@ class SdoStep(NamedTuple):
 
 
 class SdoChannel:
-    """Transfers between one client and one server, as an observer sees them.
+    """Passive listener that combines the SDO frames of one client and one server to transfers.
 
-    Observation can start in the middle of a transfer. The known part is then returned, marked as
-    partial. There are no time-outs, because only the client has them. A transfer is unanswered if
-    its client starts another one, or if the trace ends.
+    If listening starts in the middle of a transfer, the part that was seen is returned, and marked
+    as partial. A listener does not know the time-out of the client. Therefore a transfer counts as
+    unanswered only if its client starts another one, or if the log ends.
 
     Args:
-        node: node-ID of the server.
+        node: node-ID of the SDO server.
     """
 
     def __init__(self, node: int) -> None:
@@ -455,10 +456,14 @@ class SdoChannel:
     # A reader of blocks takes frames that fit at once, and all others by `request` and `response`.
 
     def turn(self) -> int:
-        """Return a code for the request that continues the transfer with an immediate answer.
+        """Return a code for the next request that would continue the running transfer.
 
-        The code is 0 if no transfer runs, 1 or 2 for an upload segment with toggle bit 0 or 1, 3 or
-        4 for a download segment with toggle bit 0 or 1, and -1 for anything else.
+        The block-wise decoder compares this code with the frames of a block.
+
+        Returns:
+            0 if no transfer is running, 1 or 2 if an upload segment with toggle bit 0 or 1 must be
+            requested, 3 or 4 if a download segment with toggle bit 0 or 1 must be sent, and -1 in
+            any other case.
         """
         running = self._running
         if running is None:
@@ -471,7 +476,10 @@ class SdoChannel:
         return (1 if upload else 3) + (taken is False)
 
     def received(self) -> tuple[int, int]:
-        """Return the received bytes of the running transfer, and its size, or 0 if unknown."""
+        """Return the number of received bytes of the running transfer, and its total size.
+
+        The size is 0 if it is unknown. Both numbers are 0 if no transfer is running.
+        """
         running = self._running
         return (0, 0) if running is None else (len(running.data), running.size or 0)
 
@@ -483,7 +491,12 @@ class SdoChannel:
         return running.entry
 
     def take_segments(self, data: bytes, toggle: bool) -> None:
-        """Add segments that continue the transfer. `toggle` is the toggle bit of the last one."""
+        """Add the data of several segments to the running transfer at once.
+
+        Args:
+            data: data bytes of all these segments.
+            toggle: toggle bit of the last segment.
+        """
         running = self._running
         assert running is not None, "a transfer runs"
         running.data += data
@@ -496,7 +509,10 @@ class SdoChannel:
         self._running = self._latest = None
 
     def block_from(self) -> TransferDirection | None:
-        """Return the direction of a running block whose last segment has not arrived, or None."""
+        """Return the direction of the block transfer whose segments are just being sent.
+
+        The result is None if no segments of a block are expected, or if the last one has arrived.
+        """
         running = self._running
         if running is None or running.phase is not _TransferPhase.BLOCK:
             return None

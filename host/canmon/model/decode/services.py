@@ -122,12 +122,12 @@ def decode_emcy(node: int, frame: CanFrame) -> Decoded:
 
 
 def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decoded:
-    """Decode boot-up, heartbeat or guarding.
+    """Return the meaning of an error control frame: boot-up, heartbeat or node guarding.
 
     Args:
-        node: node-ID of the sender.
+        node: node-ID of the sender, or for a request, of the guarded node.
         frame: frame to decode.
-        guarded: whether the frame answers a guarding request.
+        guarded: whether the frame is the answer to a guarding request.
     """
     if frame.remote:
         return Decoded("guard", node, "guarding request", asks=True)
@@ -144,7 +144,10 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
 
 
 def nmt_state_name(state: int) -> str:
-    """Return the name of an NMT state, or its number if it has no name.
+    """Return the name of an NMT state, or the hexadecimal number if no state has this number.
+
+    Args:
+        state: number of the NMT state, as in a heartbeat.
 
     >>> nmt_state_name(0x7F), nmt_state_name(0x11)
     ('pre-operational', '11h')
