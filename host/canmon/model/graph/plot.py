@@ -40,12 +40,12 @@ _Tick = tuple[float, str]
 
 
 def ticks(low: float, high: float, about: int) -> tuple[_Tick, ...]:
-    """Return round numbers between two other numbers.
+    """Return round numbers within a range, each with its text, as labels of an axis.
 
     Args:
-        low: lower number of the range.
-        high: higher number of the range, above `low`.
-        about: wanted number of results. At most 2 * `about` + 1 numbers are returned.
+        low: lower limit of the range.
+        high: upper limit of the range, greater than `low`.
+        about: approximate number of labels. The result has at most 2 * `about` + 1 labels.
     """
     exponent, step = _step(low, high, max(1, about))
     digits = max(0, -exponent)
@@ -95,13 +95,16 @@ class _Bar(NamedTuple):
 
 
 def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Bar | None]:
-    """Reduce the samples to `columns` columns of equal time, with None for empty columns.
+    """Reduce the samples of a signal to one bar for each column of a picture.
+
+    A bar holds the first, least, greatest and last value in the column. A column without samples is
+    None.
 
     Args:
         series: samples of the signal.
-        from_us: start of the first column.
-        to_us: end of the last column.
-        columns: number of columns, at least 1.
+        from_us: time at the start of the first column in microseconds.
+        to_us: time at the end of the last column in microseconds.
+        columns: number of columns, at least 1. Each covers the same time.
     """
     at_us, values = series.at_us, series.values
     span_us = max(1, to_us + 1 - from_us)
@@ -130,13 +133,13 @@ class _Stop(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve for drawing, with one stop for each column that has values.
+    """The curve of a signal with numeric values, reduced to the columns of a picture.
 
     Attributes:
         label: displayed name of the curve.
-        axis: number of the curve's vertical axis.
+        axis: number of the vertical axis that the curve belongs to, from 1.
         unit: unit of the values.
-        stops: stops of the curve, from left to right.
+        stops: values of the curve in each column that has samples, from left to right.
     """
 
     label: str
@@ -161,11 +164,13 @@ class _StateRun(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """The successive states of a signal.
+    """A horizontal bar in a picture that shows the states of a signal one after the other.
+
+    A signal such as the NMT state, whose values are states, is drawn as a band and not as a curve.
 
     Attributes:
         label: displayed name of the signal.
-        runs: states from left to right.
+        runs: states with their columns, from left to right.
     """
 
     label: str
@@ -174,14 +179,14 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """All curves and bands of a picture.
+    """All curves and bands of a graph, ready to be drawn in a terminal or as SVG.
 
     Attributes:
-        view: visible part of the signals.
-        columns: number of columns of the picture.
-        curves: curves in the requested order.
-        bands: bands in the requested order. A band is a signal whose values are states.
-        ranges: least and greatest value of each axis by number, in the order of the axes.
+        view: time span and ranges of the axes that are visible.
+        columns: width of the picture in columns.
+        curves: curves of the signals with numeric values, in the requested order.
+        bands: bands of the signals whose values are states, in the requested order.
+        ranges: least and greatest value on each vertical axis, by number of the axis.
     """
 
     view: View
@@ -297,9 +302,16 @@ def _area_of(series: Sequence[Series], width: int, height: int, title: str = "")
 def svg(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = ""
 ) -> str:
-    """Return the picture as SVG, with width and height in pixels.
+    """Return a graph of signals as the text of an SVG picture.
 
-    The first axis is on the left, other axes on the right.
+    The first vertical axis is on the left, all others are on the right.
+
+    Args:
+        series: samples of the signals.
+        view: time span and ranges of the axes to show.
+        width: width of the picture in pixels.
+        height: height in pixels. The picture becomes higher if the bands need more space.
+        title: text above the graph, empty for no title.
     """
     area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
@@ -334,7 +346,15 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
 
 
 def state_colour(band: Band, name: str) -> str:
-    """Return the colour of a state: the fixed colour of a known state, or else a free colour."""
+    """Return the colour in which a state of a band is drawn.
+
+    Known states such as `operational` have a fixed colour. Other states get one of some free
+    colours.
+
+    Args:
+        band: band that contains the state.
+        name: name of the state.
+    """
     names = dict.fromkeys(run.name for run in band.runs if run.name not in _KNOWN_STATES)
     if name not in names:
         return _KNOWN_STATES[name]
@@ -472,11 +492,14 @@ _LETTERS: Final = tuple(_letter(dots) for dots in range(256))
 
 
 class Canvas:
-    """A field of dots in layers. A cell has the colour of the topmost layer with dots in the cell.
+    """A drawing area for a terminal, in which each character cell consists of braille dots.
+
+    Dots are set in layers, one for each curve. A cell gets the colour of the highest layer that has
+    dots in it.
 
     Args:
-        width: width in cells.
-        height: height in cells.
+        width: width in character cells.
+        height: height in character cells.
         layers: number of layers.
     """
 
@@ -485,20 +508,28 @@ class Canvas:
         self._layers = [[0] * (width * DOTS_X) for _ in range(layers)]
 
     def fill(self, x: int, top: int, bottom: int, layer: int = 0) -> None:
-        """Set the dots of a column from one row to another, both included. Clip to the canvas.
+        """Draw a vertical line: set the dots of a column from row `top` to row `bottom`.
+
+        Rows outside of the canvas are ignored.
 
         Args:
-            x: column of dots, within the canvas.
-            top: row of dots, 0 at the top.
-            bottom: row of dots, not above `top`.
-            layer: number of the layer.
+            x: number of the column of dots, from 0, within the canvas.
+            top: first row of dots to set. Row 0 is at the top.
+            bottom: last row of dots to set, not less than `top`.
+            layer: number of the layer in which the dots are set.
         """
         top, bottom = max(0, top), min(self.height * DOTS_Y - 1, bottom)
         if top <= bottom:
             self._layers[layer][x] |= (1 << bottom + 1) - (1 << top)
 
     def row(self, row: int) -> list[tuple[str, int]]:
-        """Return the letters of a row of cells, each with its layer, or -1 without a layer."""
+        """Return a line of the canvas as braille characters, each with the layer that colours it.
+
+        The layer is -1 for a cell without dots.
+
+        Args:
+            row: number of the line. Line 0 is at the top.
+        """
         shift, cells = row * DOTS_Y, []
         for x in range(0, self.width * DOTS_X, DOTS_X):
             dots, top = 0, -1
@@ -533,7 +564,14 @@ class _Reading(NamedTuple):
 
 
 def read_out(series: Iterable[Series], at_us: int) -> tuple[_Reading, ...]:
-    """Return the last value of each series at a moment. A value is valid until the next frame."""
+    """Return the value of each signal at a moment, as shown at the cursor of a graph.
+
+    This is the last value at or before that moment.
+
+    Args:
+        series: samples of the signals.
+        at_us: moment in microseconds.
+    """
     return tuple(_reading(one, at_us) for one in series)
 
 
@@ -559,18 +597,19 @@ _LEAST_HEIGHT: Final = 6
 def render(
     series: Sequence[Series], view: View, width: int, height: int, *, colour: bool = False
 ) -> list[str]:
-    """Return the picture as `height` lines, each at most `width` long.
+    """Return a graph of signals as lines of text for a terminal.
 
-    The first lines name the curves. The second axis is on the right. The smallest size is 30 by 6.
-    A smaller size counts as that size.
+    There are `height` lines, each at most `width` characters long. The first lines are the names of
+    the curves. The second vertical axis is on the right. A size below 30 by 6 is increased to 30 by
+    6.
 
     Args:
         series: samples of the signals.
-        view: visible part of the signals. With a cursor, the first lines show the values at the
-            cursor.
-        width: width in cells.
+        view: time span and ranges of the axes to show. If it has a cursor, the first lines also
+            contain the values at the cursor.
+        width: width in characters.
         height: height in lines.
-        colour: whether to colour the curves with ANSI codes.
+        colour: whether to colour the curves with ANSI escape sequences.
     """
     width, height = max(width, _LEAST_WIDTH), max(height, _LEAST_HEIGHT)
     names = _names(series, view.cursor_us, width, colour)[: height - 5]
@@ -733,20 +772,21 @@ class ViewMode(StrEnum):
 
 
 class LiveGraph:
-    """Graph that collects the values of signals and shows them.
+    """Graph of signals on a live bus, which the user can zoom and move, as in `canmon tui`.
 
     Args:
-        mode: mode of the initial view.
+        mode: initial mode of the view: live, all samples, or held.
 
     Attributes:
-        words: signals of the graph.
-        mode: mode of the view.
-        window_us: length of the window that ends now.
-        cursor_us: time of the cursor, or None without a cursor.
-        axis: vertical axis that is zoomed and moved.
-        now_us: latest time of the frames.
-        first_us: time of the first frame, or None to count from the first sample.
-        stamp: format of times.
+        words: signals in the graph.
+        mode: current mode of the view.
+        window_us: length in microseconds of the time window that a live view shows.
+        cursor_us: time of the cursor in microseconds, or None if there is no cursor.
+        axis: number of the vertical axis that zooming and moving act on.
+        now_us: time of the latest frame in microseconds.
+        first_us: time of the first frame in microseconds, or None to count times from the first
+            sample.
+        stamp: format in which times are written.
     """
 
     def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:
@@ -814,25 +854,47 @@ class LiveGraph:
         return render(self.series, self.view(), width, height, colour=True)
 
     def show(self, mode: str) -> None:
-        """Change the mode of the view, and remove the cursor. `HELD` stops the present view."""
+        """Change the mode of the view, and remove the cursor.
+
+        In the mode `HELD`, the view stops at the time span that is visible now.
+
+        Args:
+            mode: new mode, a value of `ViewMode`.
+        """
         self._held = self.view()
         self.mode, self.cursor_us = ViewMode(mode), None
 
     def zoom(self, factor: float) -> None:
-        """Zoom in by a factor, at the end of a live window, or else at the cursor or the middle."""
+        """Zoom the time axis.
+
+        A live view changes the length of its window, which still ends now. Any other view is zoomed
+        around the cursor, or around its middle if there is no cursor, and is held.
+
+        Args:
+            factor: zoom factor. A factor above 1 zooms in, a factor below 1 zooms out.
+        """
         if self.mode is ViewMode.LIVE:
             self.window_us = max(LEAST_US, round(self.window_us / factor))
             return
         self._hold(self.view().zoomed(factor, self.cursor_us))
 
     def move(self, fraction: float) -> None:
-        """Move the view by a fraction of its span. A positive fraction moves to later times."""
+        """Move the view along the time axis. A live view stops, and is then held.
+
+        Args:
+            fraction: distance as a fraction of the visible time span. A positive fraction moves to
+                later times.
+        """
         self._hold(self.view().moved(fraction))
 
     def move_cursor(self, fraction: float) -> None:
-        """Move the cursor by a fraction of the view. A moving view stops.
+        """Move the cursor along the time axis. A live view stops, and is then held.
 
-        A new cursor begins in the middle.
+        If there is no cursor, a new one starts in the middle of the view.
+
+        Args:
+            fraction: distance as a fraction of the visible time span. A positive fraction moves to
+                later times.
         """
         view = self.view()
         middle_us = (view.from_us + view.to_us) // 2
@@ -847,7 +909,11 @@ class LiveGraph:
         self.axis = next((axis for axis in axes if axis > self.axis), axes[0])
 
     def stretch(self, factor: float) -> None:
-        """Zoom the vertical axis by a factor. The middle of the axis stays where it is."""
+        """Zoom the selected vertical axis around its middle value.
+
+        Args:
+            factor: zoom factor. A factor above 1 zooms in, a factor below 1 zooms out.
+        """
         low, high = self._range()
         middle, half = (low + high) / 2, (high - low) / 2 / factor
         self._set_range(middle - half, middle + half)

@@ -67,18 +67,19 @@ _FLOATS: Final = {32: "f", 64: "d"}
 
 @dataclass(frozen=True, slots=True)
 class FrameSlice:
-    """Bits of a frame, and their conversion to a value.
+    """A value that is defined by the position of its bits in a frame, such as `181[2:6]s*0.001`.
 
     Attributes:
-        can_id: identifier of the frame.
-        extended: whether the identifier has 29 bits.
-        first_bit: number of the lowest bit, 0..511, in classic CAN 0..63. Bit 0 is the lowest bit
-            of byte 0.
-        bits: number of bits, 1..64.
-        kind: kind of the number: `u` unsigned, `s` signed, `f` float.
-        big_endian: whether the first byte is the highest byte, for whole bytes only.
-        factor: factor that multiplies the number.
-        offset: offset that is then added.
+        can_id: CAN-ID of the frames, without flags.
+        extended: whether the CAN-ID has 29 bits.
+        first_bit: number of the lowest bit in the data, from 0 to 511, or 63 for classic CAN. Bit 0
+            is the lowest bit of byte 0.
+        bits: number of bits, from 1 to 64.
+        kind: type of the number: `u` for unsigned, `s` for signed, `f` for float.
+        big_endian: whether the first byte is the most significant one. This is allowed only for
+            whole bytes.
+        factor: factor by which the number is multiplied.
+        offset: offset that is added after the multiplication.
     """
 
     can_id: int
@@ -101,15 +102,20 @@ class FrameSlice:
         return (self.first_bit + self.bits + 7) // 8
 
     def value(self, data: bytes) -> float | None:
-        """Return the value in the data of a frame, or None if the frame is too short."""
+        """Return the value in a frame, or None if the frame is too short to contain it.
+
+        Args:
+            data: data bytes of the frame.
+        """
         if len(data) < self.data_bytes:
             return None
         return self._number(data) * self.factor + self.offset
 
     def values(self, payload: NDArray[np.uint64]) -> NDArray[np.float64]:
-        """Return the value in each of many payloads of eight bytes.
+        """Return the values in many frames at once, as a numpy array.
 
-        A payload is given as a little-endian number.
+        Args:
+            payload: eight data bytes of each frame as a little-endian number.
         """
         import numpy as np  # noqa: PLC0415 - an extra
 
@@ -142,10 +148,13 @@ class FrameSlice:
 
 
 def parse_slice(text: str) -> FrameSlice:
-    """Read a slice.
+    """Parse the notation for bits of a frame, such as `181[2:6]s*0.001`.
+
+    Args:
+        text: CAN-ID, position in brackets, and optionally type, byte order, factor and offset.
 
     Raises:
-        ValueError: the text is not a slice, or has bits that no frame has.
+        ValueError: the text has another form, or names bits that no frame has.
     """
     match = _NOTATION.fullmatch(text)
     if match is None:
@@ -201,12 +210,12 @@ _OBJECT: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class ObjectName:
-    """An object of a node, or one bit of it.
+    """Name of an object whose value is drawn as a curve, or of one bit of its value.
 
     Attributes:
-        node: node-ID, or None for any node. A signal of a DBC file has no node, and is also None.
-        name: name that the decoder uses, or the beginning of that name, in lower case.
-        bit: number of the bit, or None for the whole value.
+        node: node-ID, or None for any node and for signals of a DBC file.
+        name: name of the object as in decoded frames, or the beginning of that name, in lower case.
+        bit: number of the bit, from 0, or None for the whole value.
     """
 
     node: int | None
@@ -214,7 +223,13 @@ class ObjectName:
     bit: int | None = None
 
     def value(self, signal: Signal) -> float | None:
-        """Return the number of a signal, or None if the signal is not a number."""
+        """Return the number to draw: the value of a signal, or the wanted bit of it.
+
+        The result is None if the signal is not a number.
+
+        Args:
+            signal: signal of a decoded frame.
+        """
         value = signal.value
         if not isinstance(value, int | float):
             return None
@@ -256,13 +271,13 @@ _BUS_SIGNAL: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class CurveSpec:
-    """A requested curve of the graph.
+    """A curve that the user has requested, such as `speed=181[2:6]s*0.001@2`.
 
     Attributes:
-        label: name of the curve, empty if the text has none.
-        source: source of the values.
-        axis: vertical axis of the curve, from 1.
-        text: text of the signal.
+        label: label before the `=`, empty if there is none.
+        source: bits of a frame, object of a node, or other signal from which the values are taken.
+        axis: number of the vertical axis after the `@`, 1 if there is none.
+        text: text of the signal, without label and axis.
     """
 
     label: str
@@ -272,10 +287,15 @@ class CurveSpec:
 
 
 def parse_signal(text: str) -> CurveSpec:
-    """Read `[LABEL=]SIGNAL[@AXIS]`, with a slice as 181[2:6]s*0.001, or an object as 3.position.
+    """Parse the request for a curve, which has the form `[LABEL=]SIGNAL[@AXIS]`.
+
+    The signal is bits of a frame, such as `181[2:6]s*0.001`, or an object, such as `3.position`.
+
+    Args:
+        text: text of the request.
 
     Raises:
-        ValueError: the text is not a signal.
+        ValueError: the text has another form.
     """
     match = _WORD.fullmatch(text)
     if match is None:
@@ -301,20 +321,21 @@ def _object(text: str) -> ObjectName | _BusSignal:
 
 @dataclass(slots=True)
 class Series:
-    """A signal's values in the order of their times.
+    """The samples of one signal in the order of their times, which a graph draws.
 
     Args:
         label: displayed name of the signal.
-        axis: vertical axis of the signal, from 1.
+        axis: number of the vertical axis that the signal belongs to, from 1.
         unit: unit of the values, empty if unknown.
-        most: number of samples to keep. When there are twice as many, the oldest are removed. 0
-            keeps all.
+        most: number of latest samples to keep, or 0 to keep all. Older samples are removed when
+            there are twice as many.
 
     Attributes:
-        at_us: times of the samples.
-        values: values at these times.
-        not_numbers: number of values that were left out because they were NaN or infinite.
-        names: names of the values if the values are states, or None if they are numbers.
+        at_us: times of the samples in microseconds.
+        values: values of the samples.
+        not_numbers: number of values that were ignored because they were NaN or infinite.
+        names: name of each value if the values are states, such as NMT states, or None if they are
+            numbers.
     """
 
     label: str
@@ -331,9 +352,13 @@ class Series:
         return len(self.at_us)
 
     def append(self, at_us: int, value: float) -> None:
-        """Add a sample.
+        """Add a sample. A value that is NaN or infinite is not added, but counted.
 
-        A sample that is earlier than the last one gets the time of the last one.
+        If the time is before that of the previous sample, the time of the previous sample is used.
+
+        Args:
+            at_us: time of the sample in microseconds.
+            value: value of the sample.
         """
         if not isfinite(value):
             self.not_numbers += 1
@@ -376,7 +401,11 @@ class Series:
         return slice(bisect_left(self.at_us, from_us), bisect_right(self.at_us, to_us))
 
     def before(self, at_us: int) -> int | None:
-        """Return the index of the latest sample at or before a time, or None if there is none."""
+        """Return the index of the last sample at or before a time, or None if there is none.
+
+        Args:
+            at_us: time in microseconds.
+        """
         index = bisect_right(self.at_us, at_us) - 1
         return index if index >= 0 else None
 
@@ -387,15 +416,17 @@ LEAST_US = 10
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A span of time, and optionally the ranges of vertical axes.
+    """The part of a graph that is visible: a time span, and optionally ranges of the vertical axes.
 
     Attributes:
-        from_us: start of the span.
-        to_us: end of the span, after its start.
-        ranges: least and greatest value of each axis by number. Other axes fit the visible values.
-        cursor_us: moment that is marked, or None.
-        origin_us: moment that is written as 0.
-        stamp: format of times, since the origin, as seconds since the epoch, or as dates.
+        from_us: start of the time span in microseconds.
+        to_us: end of the time span in microseconds, after its start.
+        ranges: least and greatest visible value on an axis, by number of the axis. Axes without a
+            range fit the visible values.
+        cursor_us: time of the cursor in microseconds, or None if there is no cursor.
+        origin_us: time in microseconds that is written as 0.
+        stamp: format in which times are written: since the origin, in seconds since the epoch, or
+            as dates.
     """
 
     from_us: int
@@ -431,16 +462,24 @@ class View:
         return (at_us - self.origin_us) / 1e6
 
     def zoomed(self, factor: float, at_us: int | None = None) -> View:
-        """Return the view `factor` times closer. `at_us`, or else the middle, stays where it is."""
+        """Return a view with another time span, zoomed around a moment that keeps its position.
+
+        Args:
+            factor: zoom factor. A factor above 1 zooms in, a factor below 1 zooms out.
+            at_us: moment that keeps its position, in microseconds, or None for the middle of the
+                view.
+        """
         at_us = (self.from_us + self.to_us) // 2 if at_us is None else at_us
         span_us = max(LEAST_US, round(self.span_us / factor))
         from_us = at_us - (at_us - self.from_us) * span_us // self.span_us
         return replace(self, from_us=from_us, to_us=from_us + span_us)
 
     def moved(self, fraction: float) -> View:
-        """Return the view moved by a fraction of its span.
+        """Return the view moved along the time axis.
 
-        A positive fraction moves to later times.
+        Args:
+            fraction: distance as a fraction of the time span. A positive fraction moves to later
+                times.
         """
         by_us = round(self.span_us * fraction)
         return replace(self, from_us=self.from_us + by_us, to_us=self.to_us + by_us)
@@ -450,21 +489,24 @@ class View:
 
 
 class Collector:
-    """Collector of the values of some signals.
+    """Collector that takes the values of some signals from frames, for a graph.
 
-    A name that is only the beginning of an object's name selects the first object that matches.
+    If the name of a signal is only the beginning of an object's name, it selects the first object
+    in the traffic that matches.
 
     Args:
-        words: texts of the signals.
-        decoder: decoder of objects. Without a decoder, objects have no values.
-        most: number of samples as in `Series.most`.
-        rates: bit rates of the bus, used for its load.
-        each_node: whether a signal without a node has one series for each node that sends it.
+        words: signals to collect.
+        decoder: decoder that finds the values of objects, or None if only bits of frames are
+            collected.
+        most: number of latest samples to keep of each signal, or 0 to keep all.
+        rates: bit rates of the bus, from which the bus load is calculated.
+        each_node: whether a signal that names no node gets one series for each node that sends it.
 
     Attributes:
-        series: series for each signal.
-        object_names: names of the objects in the traffic during the search for one.
-        first_us: time of the first frame, or None before it.
+        series: samples of each signal.
+        object_names: names of all objects seen in the traffic while the object of a signal was not
+            found yet.
+        first_us: time of the first frame in microseconds, or None if no frame has arrived.
     """
 
     def __init__(
@@ -519,7 +561,13 @@ class Collector:
         self.take_decoded(record, wanted.take(record) if wanted else None)
 
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
-        """Add the values in a frame that is already decoded, or has none of the wanted objects."""
+        """Add the values in a frame that the caller has already decoded.
+
+        Args:
+            record: frame, with its bus and time.
+            decoded: meaning of the frame, or None if the frame contains none of the requested
+                objects.
+        """
         at_us, _, frame, _ = record
         if not isinstance(frame, ErrorFrame) and not frame.remote:
             key = frame.can_id | EXTENDED if frame.extended else frame.can_id
@@ -599,9 +647,14 @@ class _Sampler:
             series.label = f"{wanted.node}.{wanted.kind}"
 
     def take(self, record: Record, decoded: Decoded | None) -> int | None:
-        """Add the values in a frame.
+        """Add the value in a frame to the samples, if the frame contains the signal.
 
-        If the signal names no node, return the node-ID of another node that sends it.
+        If the signal names no node, and the frame comes from another node than the earlier values,
+        return the node-ID of that node. Otherwise, return None.
+
+        Args:
+            record: frame, with its bus and time.
+            decoded: meaning of the frame, or None if it was not decoded.
         """
         if self.wanted.kind == LOAD:
             self._load(record)
@@ -683,7 +736,12 @@ class _Object:
         self._is_state = False
 
     def take(self, at_us: int, decoded: Decoded) -> None:
-        """Add the value of the object if it is among the signals of the frame."""
+        """Add the value of the requested object to the samples, if the frame contains it.
+
+        Args:
+            at_us: time of the frame in microseconds.
+            decoded: meaning of the frame.
+        """
         if self.found is None and len(self._known) < _MOST_HEARD:
             self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
