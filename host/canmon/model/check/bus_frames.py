@@ -41,7 +41,7 @@ class FramePlace(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """A violation of a rule on one bus. Violations of one rule by one node later become one fault.
+    """A violation of a rule on one bus. Later, those of one node or CAN-ID become one fault.
 
     Attributes:
         rule: name of the violated rule.

@@ -78,15 +78,16 @@ class Unjudged(NamedTuple):
 
 
 class RuleCheck:
-    """Base class of checks of rules: what they report at the end of the traffic.
+    """Base class of the checks by rules. It reports the findings at the end of the traffic.
 
     Args:
         rules: rules to check.
-        bit_rate: bit rate in bits per second, used for the load.
-        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
+        bit_rate: bit rate in bits per second, from which the bus load is calculated. If it is None,
+            the bit rate in `rules` is used.
+        eds_heartbeats: producer heartbeat times (1017h) from EDS files, in ms, by node-ID.
 
     Raises:
-        ValueError: there is a limit of the load, but no bit rate.
+        ValueError: the rules limit the bus load, but the bit rate is unknown.
     """
 
     def __init__(self, rules: Rules, bit_rate: int | None, eds_heartbeats: EdsHeartbeats) -> None:

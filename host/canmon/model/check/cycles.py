@@ -88,8 +88,8 @@ class Rhythm(NamedTuple):
         missing: gaps in which frames are missing, each as the index of the gap and the number of
             missing frames.
         extra: indices of surplus frames, which lie between two frames that keep the period.
-        noisy: parts with large jitter, each as the first gap, the last gap, the usual jitter and
-            the large jitter, both in us.
+        noisy: parts with large jitter, each as the index of its first gap, the index of its last
+            gap, the usual jitter in us, and the large jitter in us.
         spread_us: usual jitter in us, as interquartile range of the gaps outside of the noisy
             parts.
         share: fraction of the gaps that have the main period, from 0 to 1.

@@ -194,12 +194,12 @@ class Never(RuleDemand):
 
 
 class Count(RuleDemand):
-    """Demand that limits how many frames of a kind arrive in total.
+    """Demand that limits how many frames match an event in total.
 
     Args:
         event: event that selects the frames to count.
         least: smallest allowed number of frames. If fewer arrive, this is reported at the end.
-        most: largest allowed number of frames, or None for no limit. The first frame above the
+        most: largest allowed number of frames, or None for no limit. Only the first frame above the
             limit is reported.
     """
 
@@ -225,7 +225,7 @@ class Count(RuleDemand):
 
 
 class Rate(RuleDemand):
-    """Demand that limits how many frames of a kind arrive within any period of a given length.
+    """Demand that limits how many frames match an event within any period of a given length.
 
     Args:
         event: event that selects the frames to count.
@@ -459,7 +459,7 @@ class Every(RuleDemand):
 
 
 class FirstWithin(RuleDemand):
-    """Demand that a first frame arrives in time.
+    """Demand that a frame which matches an event arrives within a given time.
 
     The time counts from the beginning of the traffic, or from the moment when the rule begins to
     apply.
@@ -712,7 +712,7 @@ class Steps(Follow):
     Args:
         event: name of a signal, or event that selects frames. Of a selected frame, the first value
             is used.
-        most: largest allowed change, in the unit of the value.
+        most: largest allowed change of the value.
     """
 
     def __init__(self, event: RuleEvent, most: float) -> None:
@@ -728,9 +728,9 @@ class Steps(Follow):
 
 
 class Changes(RuleDemand):
-    """Demand that a value does not stay constant for too long, as the value of a dead sensor does.
+    """Demand that a value changes at least once within a given time.
 
-    A violation is reported once, until the value changes again.
+    A value that stays constant for longer is reported once, until it changes again.
 
     Args:
         event: name of a signal, or event that selects frames. Of a selected frame, the first value

@@ -50,20 +50,23 @@ KEPT_FRAMES: Final = 1_000
 
 
 class FrameSummary(NamedTuple):
-    """The frames of an identifier, and their rhythm.
+    """Summary of the frames of one CAN-ID in a log, from which rules are learnt.
+
+    Rows are indices in `BusFrames`.
 
     Attributes:
         ident: CAN-ID with flags.
-        name: name of the identifier for display.
-        rows: rows of all frames of the identifier.
-        pieces: rows between two changes of the rhythm, if the rows are enough to find a rhythm.
-        lengths: numbers of data bytes that occur.
+        name: displayed name of the CAN-ID.
+        rows: rows of all frames of the CAN-ID.
+        pieces: parts of the rows between two changes of the rhythm, without parts that are too
+            short to find a rhythm.
+        lengths: all numbers of data bytes that occur.
         kind: kind of the frames, which is cyclic, sync or event.
-        period_us: period of the frames, or None if they have no rhythm.
-        jitter_us: interquartile range of the gaps.
+        period_us: period in microseconds, or None if the frames are not periodic.
+        jitter_us: jitter in microseconds, as interquartile range of the times between two frames.
         few: whether the frames are too few to find a rhythm.
-        irregular: whether the frames have no rhythm.
-        service: service of the frames, which is NMT, EMCY, SDO or error control.
+        irregular: whether the frames are not periodic.
+        service: whether the frames are NMT, EMCY, SDO or error control frames.
     """
 
     ident: int
@@ -161,8 +164,9 @@ class LearntBus:
 
     Attributes:
         frames: requirements for the frames of each CAN-ID, by CAN-ID with flags.
-        nodes: requirements for nodes by node-ID.
-        boot_order: groups of node-IDs in the order of their boot-ups.
+        nodes: requirements for each node, by node-ID.
+        boot_order: node-IDs in the required order of boot-ups. Nodes in one group may boot in any
+            order.
         bits_per_second: largest allowed bus load in bits per second, or None for no limit.
         usual: texts of faults that also occurred in the good log, and are therefore not reported.
         others: whether CAN-IDs that are not in `frames` are allowed.
@@ -263,7 +267,7 @@ def scanned_text(
 ) -> str:
     """Return the text of a TOML file with rules that are made from a scan of the nodes on a bus.
 
-    The rules require the identity and the heartbeat of each node. `canmon check` reads the file.
+    The rules are about the identity and the heartbeat of each node. `canmon check` reads the file.
 
     Args:
         bus: name of the bus.

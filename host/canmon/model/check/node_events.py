@@ -78,7 +78,7 @@ class Cut(NamedTuple):
 
 @dataclass(slots=True)
 class NodeEvents:
-    """The NMT state, error control frames and SDO identity that were seen of one node in a log.
+    """Events of one node in a log, such as its heartbeats, guarding answers and boot-ups.
 
     Rows are indices in `BusFrames`.
 
@@ -179,7 +179,7 @@ class BusEvents:
     Attributes:
         nodes: events of each node, by node-ID.
         hits: violations found so far.
-        cuts: moments at which the rhythm of frames may change.
+        cuts: events after which frames may have another rhythm.
         commanded: whether the log contains any NMT command.
     """
 

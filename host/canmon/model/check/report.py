@@ -42,7 +42,8 @@ def junit(
         suite: name of the test suite, which is the checked log or bus.
         names: names of all checked rules, including those without a finding.
         findings: findings in their order.
-        unjudged: reason why no rule without a finding counts as passed, empty if such rules count.
+        unjudged: reason why rules without a finding do not count as passed, or empty if they count
+            as passed.
         skipped: reason why a rule could not be judged, by name of the rule. The test case of such a
             rule is marked as skipped.
     """
@@ -85,7 +86,8 @@ def sarif(
         source: path of the log, or name of the bus, that was checked.
         names: names of all checked rules, including those without a finding.
         findings: findings in their order.
-        unjudged: reason why no rule without a finding counts as passed, empty if such rules count.
+        unjudged: reason why rules without a finding do not count as passed, or empty if they count
+            as passed.
         skipped: reason why a rule could not be judged, by name of the rule.
     """
     uri = quote(source.encode("utf-8", "surrogateescape"))

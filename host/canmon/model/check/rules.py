@@ -30,7 +30,7 @@ NO_EDS: Final[EdsHeartbeats] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """The rules for the traffic.
+    """All rules that a check applies, as given on the command line or in a TOML file.
 
     Attributes:
         max_load: largest load of any second in percent of the bit rate, or None for no limit.
