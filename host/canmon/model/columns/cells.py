@@ -117,7 +117,7 @@ def of_few(values: npt.NDArray[Any], write: Callable[[int], str]) -> Cells:
 
 
 class Texts:
-    """The text of each frame in a block, such as its meaning. At first, all texts are empty.
+    """Texts of the frames in a block, such as their meanings. At first, all texts are empty.
 
     Args:
         count: number of frames in the block.

@@ -95,7 +95,7 @@ class _Objects:
 class BlfBlocks:
     """Parser for the containers of a BLF log, which reads all frames of a container at once.
 
-    An object is called with the content of a container and the start time of the log in seconds.
+    The parser is called with the content of a container and the start time of the log in seconds.
 
     Args:
         channels: numbers of the buses, shared by all containers of the log.

@@ -52,7 +52,7 @@ _Values = npt.NDArray[np.float64]
 
 
 class ColumnSurvey:
-    """Updates a survey of a log from blocks of frames, with numpy, for `canmon report` and graphs.
+    """Updates a survey from blocks of frames, with numpy, for `canmon report` and `canmon graph`.
 
     Args:
         decoder: decoder for single frames that the survey uses. Its decoders in `first` may only be

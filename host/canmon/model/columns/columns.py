@@ -32,7 +32,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class NoColumnsError(ValueError):
-    """Raised if a log with CAN FD frames is read as columns. Read such a log frame by frame."""
+    """Raised if a log with CAN FD frames is read as numpy arrays. Read it frame by frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
