@@ -229,7 +229,8 @@ class BusDecoder:
     def answers_guarding(self, node: int) -> bool:
         """Return whether a node answers node guarding requests.
 
-        A node with a producer heartbeat time (1017h) does not, because CiA 301 does not allow both.
+        A node with a producer heartbeat time (1017h) does not, because it sends heartbeats instead
+        (CiA 301, error control).
 
         Args:
             node: node-ID of the node.

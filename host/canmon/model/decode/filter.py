@@ -291,7 +291,7 @@ def signal_place(path: str) -> tuple[int | None, str, int | None]:
 def number(text: str) -> float | None:
     """Parse a number as written in filters, or return None if the text is not a number.
 
-    Decimal and hexadecimal numbers are allowed, also with an `h` at the end.
+    An integer may be decimal, or hexadecimal as in `0x10` or `8130h`.
 
     >>> number("0x10"), number("-1.5"), number("8130h"), number("fast")
     (16, -1.5, 33072, None)
@@ -312,7 +312,8 @@ def number(text: str) -> float | None:
 def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
     """Return a function that returns whether a signal fulfils a comparison with a given value.
 
-    If the given value is a number, the number of the signal is compared, otherwise its text.
+    If the given value is a number, it is compared with the value of the signal, otherwise with the
+    text of the signal.
 
     Args:
         sign: comparison operator from `COMPARISONS`. If the value is not a number, only the

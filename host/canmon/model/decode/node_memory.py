@@ -107,8 +107,8 @@ class ObjectText(NamedTuple):
     def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
         """Decode the bytes of an object's value, and return the value and its text.
 
-        Surplus bytes are removed first, as by `fitted`. If the bytes do not fit the data type, they
-        are decoded without it.
+        Surplus bytes are removed first, as by `fitted`. If the bytes do not fit the data type of
+        the object, the data type is ignored.
 
         Args:
             data: bytes that were transferred.
