@@ -528,7 +528,7 @@ class Canvas:
         The layer is -1 for a cell without dots.
 
         Args:
-            row: number of the line. Line 0 is at the top.
+            row: number of the line in the canvas. Line 0 is at the top.
         """
         shift, cells = row * DOTS_Y, []
         for x in range(0, self.width * DOTS_X, DOTS_X):
@@ -772,7 +772,7 @@ class ViewMode(StrEnum):
 
 
 class LiveGraph:
-    """Graph of signals on a live bus, which the user can zoom and move, as in `canmon tui`.
+    """Graph of signals in a terminal, which the user can zoom and move, as in `canmon tui`.
 
     Args:
         mode: initial mode of the view: live, all samples, or held.
@@ -867,8 +867,9 @@ class LiveGraph:
     def zoom(self, factor: float) -> None:
         """Zoom the time axis.
 
-        A live view changes the length of its window, which still ends now. Any other view is zoomed
-        around the cursor, or around its middle if there is no cursor, and is held.
+        In the mode `LIVE`, the length of the window changes, and the window still ends now. In any
+        other mode, the view is zoomed around the cursor, or around its middle if there is no
+        cursor, and the mode becomes `HELD`.
 
         Args:
             factor: zoom factor. A factor above 1 zooms in, a factor below 1 zooms out.
@@ -879,7 +880,7 @@ class LiveGraph:
         self._hold(self.view().zoomed(factor, self.cursor_us))
 
     def move(self, fraction: float) -> None:
-        """Move the view along the time axis. A live view stops, and is then held.
+        """Move the view along the time axis. The mode becomes `HELD`, so that a live view stops.
 
         Args:
             fraction: distance as a fraction of the visible time span. A positive fraction moves to
@@ -888,7 +889,7 @@ class LiveGraph:
         self._hold(self.view().moved(fraction))
 
     def move_cursor(self, fraction: float) -> None:
-        """Move the cursor along the time axis. A live view stops, and is then held.
+        """Move the cursor along the time axis. The mode becomes `HELD`, so that a live view stops.
 
         If there is no cursor, a new one starts in the middle of the view.
 
