@@ -3,7 +3,9 @@
 >>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
 >>> frames = [Record(at * 100_000, "can0", CanFrame.parse("705#05")) for at in range(20)]
->>> [str(fault) for fault in diagnose([frames[:9] + frames[10:]]).faults]
+>>> diagnoser = Diagnoser()
+>>> diagnoser.take(frames[:9] + frames[10:])
+>>> [str(fault) for fault in diagnoser.diagnosis().faults]
 ['no-lost-heartbeat: can0 node 5: no heartbeat for 200.000 ms, one each 100.000 before']
 """
 
