@@ -119,6 +119,7 @@ class TickrigBus(can.BusABC):
         except KeyError:
             hint = near(str(channel), CHANNELS.names)
             raise can.CanInitializationError(f"no rig offers channel {channel!r}; {hint}") from None
+        self._channel = str(channel)  # in messages: without a blank, as log formats need it
         self.channel_info = f"tickrig {channel}"
         super().__init__(channel, can_filters)
 
@@ -140,7 +141,7 @@ class TickrigBus(can.BusABC):
             if taken is None:
                 return None
             message = to_message(taken[1], taken[0])
-            message.channel, message.is_rx = self.channel_info, not self._host.is_own(taken[0])
+            message.channel, message.is_rx = self._channel, not self._host.is_own(taken[0])
             if self._matches_filters(message):
                 return message
             more = deadline_us is not None and self.now_us > begun_us

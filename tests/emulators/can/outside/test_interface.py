@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import can
 import canopen
@@ -50,7 +51,7 @@ def test_time_passes_while_a_message_is_waited_for(log: Log) -> None:
         message = bus.recv(1)
         assert message is not None
         assert (to_frame(message), bus.now_us) == (frames("201#0100")[0], 4_066)
-        assert (message.timestamp, message.channel) == (0.004066, "tickrig robot")
+        assert (message.timestamp, message.channel) == (0.004066, "robot")
         assert (bus.recv(0.01), bus.now_us) == (None, 14_066)
         assert bus.recv(0) is None
 
@@ -100,6 +101,19 @@ def test_a_bus_that_is_to_listen_only_is_refused(log: Log) -> None:
 def test_filters_count_and_the_timeout_is_that_of_the_rig(log: Log) -> None:
     with open_bus(can_filters=[{"can_id": 0x201, "can_mask": 0x7FF}]) as bus:
         assert (bus.recv(1), bus.now_us) == (None, 1_000_000)
+
+
+@pytest.mark.parametrize("kind", ["log", "asc", "blf", "csv", "trc"])
+def test_a_logger_of_the_library_writes_what_its_reader_reads(
+    log: Log, tmp_path: Path, kind: str
+) -> None:
+    path = tmp_path / f"run.{kind}"
+    with can.Bus(interface="tickrig", channel="robot") as bus, can.Logger(path) as logger:
+        for message in [bus.recv(0.1), bus.recv(0.1)]:
+            assert message is not None
+            logger(message)
+    with can.LogReader(path) as reader:
+        assert [message.arbitration_id for message in reader] == [0x101, 0x101]
 
 
 def test_several_buses_of_one_channel_hear_each_other(log: Log) -> None:
