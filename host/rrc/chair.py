@@ -71,10 +71,10 @@ _STOPS: Final = frozenset(
 
 
 class ChairStopped(Exception):  # noqa: N818 - what happened
-    """VR2 is off or was stopped.
+    """The wheelchair (VR2) is switched off, or it stopped while the program was driving it.
 
     Attributes:
-        kind: event that reported the stop, or None if there was no event.
+        kind: event with which the RRC reported the stop, or None if there was no event.
     """
 
     def __init__(self, message: str, kind: RrcEvent | None = None) -> None:
@@ -83,16 +83,18 @@ class ChairStopped(Exception):  # noqa: N818 - what happened
 
 
 class NotAnRrc(LinkError):  # noqa: N818 - what is there
-    """The device that answers is not an RRC."""
+    """The device on the serial line answers, but not as an RRC."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Protection of the chair while a program controls it.
+    """Safety settings that `Chair` makes in the RRC before a program may drive the wheelchair.
 
     Attributes:
-        watchdog_us: time without a command after which VR2 stops. 0 switches the watchdog off.
-        stable: whether stablemode is switched on.
+        watchdog_us: time without a command, in us, after which the RRC stops the wheelchair. 0
+            switches this watchdog off.
+        stable: whether the RRC's stablemode is switched on, in which each line has a checksum
+            (CHECK).
     """
 
     watchdog_us: int = 500_000
@@ -100,7 +102,7 @@ class Guard:
 
 
 class DeadMan:
-    """A dead-man key, which must be pressed again within a second."""
+    """A dead-man key. A press is valid for 1 s, so the driver must press the key repeatedly."""
 
     def __init__(self) -> None:
         self._until_us: int | None = None
@@ -151,21 +153,24 @@ class _OpeningLink:
 
 
 class Chair(Closing):
-    """A wheelchair with an RRC, protected by a guard. The end of a `with` block stops the motors.
+    """A wheelchair that a program drives through an RRC (the Robotic Relay Communicator) safely.
+
+    The constructor checks that the device is an RRC and makes the safety settings of `guard`. The
+    end of a `with` block stops the motors and restores the earlier settings of the RRC.
 
     Args:
-        link: open line, which the chair closes at the end.
-        guard: protection of the chair.
+        link: open serial line to the RRC. The chair closes the line at the end.
+        guard: watchdog and stablemode settings that protect the person in the chair.
 
     Attributes:
         client: client that communicates with the RRC.
-        guard: protection of the chair.
+        guard: watchdog and stablemode settings that protect the person in the chair.
         moved: whether the motors may run because of this program.
 
     Raises:
         NotAnRrc: another device answers.
         LinkTimeout: no device answers.
-        LinkClosed: the line is gone.
+        LinkClosed: the serial line is closed or its port has disappeared.
     """
 
     def __init__(self, link: Link[bytes], guard: Guard) -> None:
@@ -249,7 +254,10 @@ class Chair(Closing):
             client.watchdog(0)
 
     def status(self) -> StatusA | None:
-        """Switch status lines on and return the next status line, or None if VR2 is off."""
+        """Return the next status line of the wheelchair, or None if the wheelchair is off.
+
+        The first call switches the stream of status lines on.
+        """
         if self._status_since_us is None:
             self._status_since_us = self.client.now_us
             self.client.status()
@@ -267,7 +275,16 @@ class Chair(Closing):
         return status
 
     def take_over(self, speed_mode: int = 1) -> None:
-        """Let the host drive, in a speed mode, and start with 0 % in both directions."""
+        """Let this program drive the wheelchair instead of the stick.
+
+        The first command is a standstill.
+
+        Args:
+            speed_mode: speed mode of the wheelchair, 1 (slowest) to 5.
+
+        Raises:
+            ChairStopped: the wheelchair (VR2) is off.
+        """
         self.require_on()
         self.moved = True
         self.client.drive_by_host(0, 0)
@@ -276,11 +293,15 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def drive(self, v_pct: int, w_pct: int) -> None:
-        """Drive for 20 ms, forward and to the right, each in -100..100 %.
+        """Drive the wheelchair for 20 ms. Call this method in a loop after `take_over`.
+
+        Args:
+            v_pct: translation in -100..100 %, forward positive.
+            w_pct: rotation in -100..100 %, right positive.
 
         Raises:
-            ChairStopped: VR2 was stopped, or deviates from the command.
-            LinkTimeout: status lines have stopped.
+            ChairStopped: the wheelchair (VR2) was stopped, or its motors do not follow the command.
+            LinkTimeout: the RRC no longer sends status lines.
         """
         try:
             if (v_pct, w_pct) != self._sent or self.client.now_us >= self._resend_us:
@@ -293,7 +314,7 @@ class Chair(Closing):
         self.watch()
 
     def drive_by_stick(self, limit: Limit, speed_mode: int = 1) -> None:
-        """Let the stick drive within limits, in a speed mode."""
+        """Let the stick drive within limits, in a speed mode from 1 (slowest) to 5."""
         self.require_on()
         self.moved = True
         self._sent = None
@@ -302,11 +323,14 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def watch(self) -> list[Arrival[Event]]:
-        """Check lines received since the last call. Return the events that do not end the drive.
+        """Check the lines received since the last call, and end the drive if they report a problem.
+
+        Returns:
+            The events that are no reason to stop, oldest first.
 
         Raises:
-            ChairStopped: VR2 was stopped, or deviates from the command.
-            LinkTimeout: status lines have stopped, or the RRC does not answer.
+            ChairStopped: the wheelchair (VR2) was stopped, or its motors do not follow the command.
+            LinkTimeout: the RRC no longer sends status lines, or it does not answer.
         """
         self.ask_if_silent()
         events = []
@@ -331,9 +355,10 @@ class Chair(Closing):
         return events
 
     def ask_if_silent(self) -> None:
-        """If no status line has arrived for a second, check that the RRC still answers.
+        """Check that the RRC still answers, by a query, if no status line has arrived for a second.
 
-        VR2 may be switched off, and then sends no status lines.
+        A missing status line alone is no error, because the RRC sends none while the wheelchair
+        (VR2) is off.
 
         Raises:
             LinkTimeout: the RRC does not answer.
@@ -354,12 +379,14 @@ class Chair(Closing):
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
         """Simulate a program that hangs: send nothing until an event arrives, then resume sending.
 
+        The test procedure uses this to check that the RRC's watchdog stops the wheelchair.
+
         Args:
-            kind: kind of the event.
-            most_us: longest wait.
+            kind: kind of the expected event.
+            most_us: longest wait for the event in us.
 
         Returns:
-            The time until the event, or None after the time-out.
+            The time until the event in us, or None if the event did not arrive in time.
         """
         lines, began_us = LineSplitter(), self.client.now_us
         wanted = Event(kind).encode().removesuffix(b"\n")
@@ -375,7 +402,7 @@ class Chair(Closing):
     def stop(self) -> None:
         """Stop the motors, and wait for a status line that confirms the stop.
 
-        Without this confirmation, VR2 is switched off.
+        If no status line confirms the stop, the wheelchair (VR2) is switched off.
         """
         if not self.moved:
             return

@@ -92,10 +92,11 @@ _HINTS: Final = {
 
 
 class RrcRefused(DeviceRefused):
-    """The RRC answered a command with ER.
+    """The RRC refused a command, which means that it answered with an `ER:` line.
 
     Attributes:
-        code: reason given by the RRC, which is a command's name, or `CommandChecksum` and others.
+        code: reason given by the RRC: the name of the refused command, or a general reason such as
+            `CommandChecksum`.
         sent: line that was refused, without LF.
     """
 
@@ -106,12 +107,12 @@ class RrcRefused(DeviceRefused):
 
 
 class RrcStopped(DeviceRefused):
-    """The RRC refused too many times in a row. The client has stopped sending.
+    """The RRC refused too many commands in a row, so the client has stopped sending.
 
     The client sends again after EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
 
     Attributes:
-        code: reason of the last refusal.
+        code: reason that the RRC gave for the last refusal.
     """
 
     def __init__(self, what: str, code: str) -> None:
@@ -138,13 +139,14 @@ _log = log_of(__name__)
 
 @dataclass(frozen=True, slots=True)
 class RrcLoad:
-    """The load of an RRC with running VR2, computed from the client's lines of the last second.
+    """Processing load of an RRC, estimated from the lines that the client sent in the last second.
 
-    Lines that other programs send to the same RRC are not included.
+    The values apply while the wheelchair (VR2) is on. Lines that other programs send to the same
+    RRC are not included.
 
     Attributes:
-        load_pct: load in per cent, which is 30 for the RRC's own work, plus the cost of the lines.
-        margin_pct: remainder of the load to 100. The client leaves 10 or more.
+        load_pct: load in per cent: 30 for the RRC's own work, plus the cost of the lines.
+        margin_pct: remaining capacity, 100 minus `load_pct`. The client leaves 10 or more.
         pace_lines_s: maximum number of lines per second without waiting for answers.
     """
 
@@ -198,7 +200,12 @@ class Channel:
         self._put_unawaited(command)
 
     def request(self, command: Command, timeout_us: int) -> str:
-        """Send a command and wait until the RRC has processed it. Return the text of the answer."""
+        """Send a command, wait until the RRC has processed it, and return the text of the answer.
+
+        Args:
+            command: command to send.
+            timeout_us: longest wait for the answer in us.
+        """
         self._wait_turn(command)
         exchange = Exchange(command, stable=self.matcher.settings.stable)
         for line in exchange.lines:

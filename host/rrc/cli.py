@@ -33,11 +33,12 @@ _ANGLE: Final = click.IntRange(0, 90)
 
 @dataclass(frozen=True, slots=True)
 class RrcCall:
-    """The options that precede the verb on the command line of `rrc`.
+    """Options of the command `rrc` that stand before the verb, as in `rrc URL --pad PATH drive`.
 
     Attributes:
-        url: URL of the port, empty if none was given.
-        watchdog_us: time of the watchdog of the RRC. 0 switches it off.
+        url: device path or pyserial URL of the port, empty if none was given.
+        watchdog_us: time without a command, in us, after which the RRC stops the wheelchair. 0
+            switches this watchdog off.
         stable: whether stablemode is switched on.
         pad: path of a game pad, or None without a pad.
     """

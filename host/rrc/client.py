@@ -76,7 +76,7 @@ class RrcClient(Closing):
 
     @classmethod
     def open(cls, url: str) -> Self:
-        """Open a port and start the communication.
+        """Open the serial port of an RRC and start the communication.
 
         Args:
             url: device path or pyserial URL, as for `SerialLink`.
@@ -97,10 +97,11 @@ class RrcClient(Closing):
         return client
 
     def start(self) -> None:
-        """Start as the manual advises: send a dummy command, wait, and empty the buffer.
+        """Start the communication with the RRC in the way that its manual advises.
 
-        Afterwards the client knows whether an earlier program left stablemode on. Lines received
-        before the start are dropped, including events.
+        The client sends a dummy command, waits, and empties the receive buffer. It also finds out
+        whether an earlier program left stablemode on. Lines that arrived before the start are
+        dropped, including events.
 
         Raises:
             LinkTimeout: no RRC answers.
@@ -139,7 +140,7 @@ class RrcClient(Closing):
 
     @property
     def watchdog_us(self) -> int:
-        """The time of the watchdog that the client renews, or 0 if no watchdog is set."""
+        """Time in us of the watchdog that the client renews, or 0 if the watchdog is off."""
         return self._settings.watchdog_10ms * 10_000
 
     @property
@@ -149,12 +150,15 @@ class RrcClient(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line received in any call. Check the age of this line before use."""
+        """The newest status line that the client has received, or None if there was none.
+
+        The line may be old, so compare its `at_us` with `now_us` before use.
+        """
         return self._inbox.latest_status
 
     @property
     def load(self) -> RrcLoad:
-        """The load of the RRC that this client causes, and the largest rate of lines."""
+        """Processing load that this client causes in the RRC, and the highest rate of lines."""
         return self._channel.load
 
     def resume(self) -> None:
@@ -165,22 +169,22 @@ class RrcClient(Closing):
         self._channel.resume()
 
     def command(self, command: Command, *, confirm: bool | None = None) -> str:
-        """Send any command and wait until the RRC has processed it.
+        """Send any command and, by default, wait until the RRC has processed it.
 
         Args:
             command: command to send.
             confirm: whether to wait for the confirmation. False sends the command without waiting,
-                for a stream of commands. An ER that arrives later then counts as a refusal. By
-                default, the client waits for all commands except `output` with stablemode on. For
-                `stablemode`, the client always waits.
+                for example in a fast stream of commands. If the RRC refuses such a command later,
+                the client counts the refusal. By default, the client waits, except for `output`
+                with stablemode on. It always waits for `stablemode`.
 
         Returns:
-            The answer to `device`, `version` or `date`, empty for other commands.
+            The answer to `device`, `version` or `date`. The answer is empty for other commands.
 
         Raises:
-            RrcRefused: the RRC answered ER.
+            RrcRefused: the RRC refused the command (ER).
             LinkTimeout: the RRC did not answer.
-            RrcStopped: there were too many refusals.
+            RrcStopped: the RRC refused too many commands in a row.
             LinkClosed: the line is gone.
         """
         if confirm is None:
@@ -191,10 +195,10 @@ class RrcClient(Closing):
         return ""
 
     def run_for(self, duration_us: int) -> None:
-        """Wait for a time, and receive lines.
+        """Wait like `time.sleep`, but receive lines and renew the watchdog during the wait.
 
         Args:
-            duration_us: time to wait in us. 0 only reads available lines.
+            duration_us: time to wait in us. 0 only reads the lines that have already arrived.
 
         Raises:
             LinkClosed: the line is gone.
@@ -205,10 +209,11 @@ class RrcClient(Closing):
             self._channel.step(until_us)
 
     def events(self, timeout_us: int) -> Iterator[Arrival[Event]]:
-        """Yield events. The oldest event is first.
+        """Yield the events that the RRC sent and that were not read yet, oldest first.
 
         Args:
-            timeout_us: longest wait for each event. After this time, the iteration ends.
+            timeout_us: longest wait for each event in us. The iteration ends when no event arrives
+                in time.
 
         Yields:
             An event with the time at which it arrived.
@@ -216,10 +221,11 @@ class RrcClient(Closing):
         return self._drain(self._inbox.events, timeout_us)
 
     def statuses(self, timeout_us: int) -> Iterator[Arrival[StatusA]]:
-        """Yield status lines. The oldest status line is first.
+        """Yield the status lines that the RRC sent and that were not read yet, oldest first.
 
         Args:
-            timeout_us: longest wait for each status line. After this time, the iteration ends.
+            timeout_us: longest wait for each status line in us. The iteration ends when none
+                arrives in time.
 
         Yields:
             A status line with the time at which it arrived.
@@ -227,17 +233,20 @@ class RrcClient(Closing):
         return self._drain(self._inbox.statuses, timeout_us)
 
     def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
-        """Return the first event of a kind. An event received before the call also counts.
+        """Wait for an event of a given kind, and return the first such event.
+
+        An event that arrived before the call and was not read yet also counts. Events that are
+        older than the returned event are dropped.
 
         Args:
-            kind: kind of the event.
-            timeout_us: longest wait.
+            kind: kind of the expected event.
+            timeout_us: longest wait in us.
 
         Returns:
             The event with the time at which it arrived.
 
         Raises:
-            LinkTimeout: no such event arrived. The other events are kept.
+            LinkTimeout: no such event arrived. The other events can still be read.
         """
         events = self._inbox.events
         until_us = self._link.now_us + timeout_us
@@ -260,7 +269,9 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Drive by the stick, within limits (command `limit`).
+        """Let the stick drive the wheelchair, within limits (command `limit`).
+
+        In the limits, v is the translation and w is the rotation that the stick requests.
 
         Args:
             v_pct: largest translation, 0..100 %.
@@ -270,16 +281,16 @@ class RrcClient(Closing):
             radius_pct: largest root of v² + w², 0..255 %.
 
         Raises:
-            RrcRefused: VR2 is off.
+            RrcRefused: the wheelchair (VR2) is off.
         """
         self.command(cmd.Limit(v_pct, w_pct, sum_pct, product_pct, radius_pct))
 
     def output(self, v_pct: int, w_pct: int, *, confirm: bool | None = None) -> None:
-        """Drive with translation (forward) and rotation (right), each in -100..100 %.
+        """Drive the wheelchair with a translation and a rotation (command `output`).
 
         Args:
-            v_pct: translation in per cent, forward positive.
-            w_pct: rotation in per cent, right positive.
+            v_pct: translation in -100..100 %, forward positive.
+            w_pct: rotation in -100..100 %, right positive.
             confirm: whether to wait for the confirmation. By default, the client waits with
                 stablemode off, and does not wait with stablemode on.
         """
@@ -298,7 +309,7 @@ class RrcClient(Closing):
         return self.command(cmd.Date())
 
     def speedmode(self, mode: int, *, locked: bool = False) -> None:
-        """Choose the speed mode.
+        """Choose the speed mode of the wheelchair.
 
         Args:
             mode: speed mode, 1 (slowest) to 5.
@@ -307,17 +318,18 @@ class RrcClient(Closing):
         self.command(cmd.SpeedMode(mode, int(locked)))
 
     def joystick(self, shape: cmd.Joystick) -> None:
-        """Set the response of the stick.
+        """Set how the wheelchair responds to movements of its stick (command `joystick`).
 
         Args:
-            shape: values of the ten parameters of the command, by name.
+            shape: the ten parameters of the command.
         """
         self.command(shape)
 
     def watchdog(self, time_us: int) -> None:
-        """Set the time without a command after which the RRC stops VR2.
+        """Set the time without a command after which the RRC stops the wheelchair (watchdog).
 
-        From then on, the client renews the watchdog in each of its calls.
+        From then on, each call of the client renews the watchdog. The wheelchair therefore stops if
+        the program hangs.
 
         Args:
             time_us: time in 0..2_550_000 us, a multiple of 10_000 us. 0 switches the watchdog off.
@@ -328,9 +340,10 @@ class RrcClient(Closing):
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
-        """Switch stablemode on or off.
+        """Switch the RRC's stablemode on or off, which protects lines by a checksum.
 
-        With stablemode, the client appends CHECK to each line, and the RRC sends no OK lines.
+        With stablemode, the client appends the checksum (CHECK) to each line, and the RRC does not
+        confirm commands with OK lines.
 
         Args:
             on: whether to switch stablemode on.
@@ -338,7 +351,9 @@ class RrcClient(Closing):
         self.command(cmd.StableMode(int(on)))
 
     def status(self, *, on: bool = True) -> None:
-        """Switch the stream of status lines on or off. A line comes each 10 ms while VR2 is on.
+        """Switch the stream of status lines on or off.
+
+        The RRC sends a status line each 10 ms while the wheelchair (VR2) is on.
 
         Args:
             on: whether to switch the stream on.
@@ -350,24 +365,25 @@ class RrcClient(Closing):
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:
-        """Sound the buzzer.
+        """Sound the buzzer of the wheelchair in a pattern.
 
         Args:
-            times_us: up to ten durations in us. The buzzer is on for the first one, off for the
-                second one, and so on. Each is in 0..2_550_000 and a multiple of 10_000.
+            times_us: up to ten durations in us. The buzzer is on for the first duration, off for
+                the second one, and so on. Each duration is in 0..2_550_000 and a multiple of
+                10_000.
 
         Raises:
-            ValueError: a time is out of range.
+            ValueError: a duration is out of range.
         """
         times = tuple(_units(time_us) for time_us in times_us)
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
-        """Send `output`. If the stick was driving, select the slowest speed mode first.
+        """Let this program drive, and select the slowest speed mode first if the stick was driving.
 
-        The manual advises the slowest speed mode for every change between limit and output. The
-        client waits for the confirmation of the first output. Select the speed mode again
-        afterwards.
+        The RRC manual advises the slowest speed mode for each change of the driver (between `limit`
+        and `output`). The first `output` after the change waits for the confirmation. Select the
+        wanted speed mode again afterwards.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.
@@ -384,9 +400,10 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Send `limit`. If the host was driving, select the slowest speed mode first.
+        """Let the stick drive, and select the slowest speed mode first if this program was driving.
 
-        The arguments are those of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
+        The arguments are the same as those of `limit`: v_pct, w_pct, sum_pct, product_pct,
+        radius_pct.
         """
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)

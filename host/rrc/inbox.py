@@ -54,11 +54,11 @@ _log = log_of(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Arrival(Generic[_T]):
-    """A received item with its time.
+    """A line received from the RRC, with the time at which it arrived.
 
     Attributes:
-        at_us: time of arrival on the link's clock.
-        value: received item, which is an `Event`, a `StatusA`, or the text of an unknown line.
+        at_us: time of arrival in us, on the link's clock.
+        value: content of the line: an `Event`, a `StatusA`, or the text of an unknown line.
     """
 
     at_us: int
@@ -66,13 +66,14 @@ class Arrival(Generic[_T]):
 
 
 class Inbox:
-    """An inbox for received lines. It stores events and status lines, and returns the others.
+    """Store of the received events and status lines that the program has not read yet.
 
-    Lines that the manual does not list, and SA lines that do not match their CHECK, are kept in
-    `unknown` and reported without an error. Newer firmware and noise on the line cause them.
+    Replies to commands are not stored. The inbox returns them to its caller. Lines that the manual
+    does not list, and SA lines with a wrong CHECK, are kept in `unknown` and reported without an
+    error, because newer firmware or noise on the line can cause them.
 
     Args:
-        on_unknown: function that is called with each of these lines.
+        on_unknown: function that is called with each unknown line.
 
     Attributes:
         events: events that were not read yet.
@@ -140,14 +141,14 @@ _QUERIES: Final = (DeviceName, Version, Date)
 
 
 class Exchange:
-    """A command in progress.
+    """A command that was sent to the RRC, together with the replies received for it so far.
 
     Args:
-        command: command of the exchange.
+        command: command that is sent.
         stable: whether stablemode is on when the command is sent.
 
     Attributes:
-        lines: bytes to send, line by line.
+        lines: lines to send, as bytes. In stablemode, a query follows a command without an answer.
         text: answer to a query, empty for other commands.
         refusal: reason of the RRC's refusal, or None without a refusal.
         done: whether the last expected line has arrived.
@@ -198,7 +199,10 @@ class Exchange:
         return self.refusal is not None and self.has_barrier and reason == self._last
 
     def take(self, answer: Answer) -> bool:
-        """Process a line that belongs to this exchange. Return whether the line belongs to it."""
+        """Process a reply of the RRC.
+
+        Return False if the reply does not belong to this exchange.
+        """
         match answer:
             case Refusal(reason):
                 return self._take_refusal(reason)

@@ -48,13 +48,13 @@ _STYLES: Final = {"<": "bold cyan", ">": "bold green", "!": "bold red"}
 
 
 class ChairPanel(FramedApp):
-    """A panel that drives and shows a chair.
+    """Full-screen terminal panel that shows the state of a wheelchair and drives it by keys.
 
-    If the terminal is smaller than 80 x 24, the panel draws no square for the stick position. The
-    smallest usable size is 60 x 15.
+    If the terminal is smaller than 80 x 24 characters, the panel does not draw the stick position.
+    The smallest usable size is 60 x 15.
 
     Args:
-        pilot: pilot that the keys control.
+        pilot: pilot that executes what the keys request.
         url: URL of the port as shown on the screen.
 
     Attributes:

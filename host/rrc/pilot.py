@@ -34,27 +34,28 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return the values to drive in per cent, which are 0 while no button is held.
+        """Return the translation and rotation to drive, in per cent, or 0 while no button is held.
 
-        The method raises ChairStopped if the pad is gone.
+        The method raises ChairStopped if the game pad is gone.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PilotView:
-    """The state of panel and chair at one time.
+    """Snapshot of the wheelchair and of the settings made in the panel, which the panel draws.
 
     Attributes:
-        now_us: time of the state.
-        drives: driver of the chair.
-        aim_pct: values driven while the dead-man key is held, in per cent.
+        now_us: time of the snapshot in us.
+        drives: who drives the chair: the host, the stick, or nobody.
+        aim_pct: translation and rotation that the host drives while the dead-man key is held, in
+            per cent.
         held: whether the dead-man key is held.
-        speed_mode: speed mode that was chosen.
-        most_pct: limit of the stick in per cent.
-        status: latest status line, or None while VR2 is off.
+        speed_mode: chosen speed mode, 1 (slowest) to 5.
+        most_pct: limit of translation and rotation while the stick drives, in per cent.
+        status: latest status line, or None while the wheelchair (VR2) is off.
         load: load of the RRC that this program causes.
-        lines: events and actions as `(time, mark, text)`.
+        lines: latest events and actions as `(time, mark, text)`.
     """
 
     now_us: int
@@ -69,11 +70,14 @@ class PilotView:
 
 
 class Pilot:
-    """A pilot that drives a chair in one thread, while another thread controls and reads the pilot.
+    """Driver of a wheelchair that one thread runs while the screen's thread gives it requests.
+
+    One thread calls `step` repeatedly. Another thread, such as that of `ChairPanel`, calls the
+    other methods and reads `view`.
 
     Args:
-        chair: chair that a guard protects.
-        pad: game pad that is used instead of the keys, or None.
+        chair: chair to drive.
+        pad: game pad that replaces the keys for driving, or None.
 
     Attributes:
         view: present state of panel and chair.
@@ -108,7 +112,7 @@ class Pilot:
         self._aim_pct = max(-100, min(100, v + v_pct)), max(-100, min(100, w + w_pct))
 
     def take(self, drives: Drives) -> None:
-        """Choose the host or the stick as driver, or stop the chair."""
+        """Choose who drives the chair: the host or the stick. `Drives.STOPPED` stops the chair."""
         self.release()
         self._acts.append(lambda: self._take(drives))
 
@@ -140,7 +144,7 @@ class Pilot:
     # Called by the thread of the line.
 
     def step(self) -> None:
-        """Execute requests of the panel, then drive or listen for 20 ms.
+        """Execute the requests of the panel, then drive or wait for 20 ms, and update `view`.
 
         Raises:
             LinkError: the line is gone, or the RRC does not answer.

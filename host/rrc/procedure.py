@@ -58,14 +58,14 @@ class Quit(Exception):  # noqa: N818 - what the operator did
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """The result of a step of the procedure.
+    """Result of one step of the RRC test procedure, as shown to the operator and saved as JSON.
 
     Attributes:
         step: title of the step.
-        sent: sample line without CHECK, empty if the step sends no line.
-        check: CHECK of the sample line, empty in the first round.
+        sent: command line that the step sends, without CHECK. It is empty if the step sends none.
+        check: CHECK (checksum) of that line, empty in the first round, which has no CHECK.
         passed: whether the RRC behaved as described in the manual.
-        reason: the reason of a failure.
+        reason: reason of a failure, empty if the step passed.
     """
 
     step: str
@@ -81,12 +81,14 @@ class _Failed(Exception):  # noqa: N818 - the verdict
 
 @dataclass(slots=True)
 class Procedure:
-    """The test procedure with the RRC, which runs the steps of both rounds.
+    """Test procedure for an RRC with a wheelchair, in which an operator answers questions.
+
+    The procedure has two rounds of steps, first without stablemode and then with it.
 
     Args:
-        chair: chair with its watchdog, without stablemode.
-        operator: person at the chair.
-        report: function that is called with each result.
+        chair: chair whose watchdog is set, without stablemode.
+        operator: person at the chair, who gets instructions and answers questions.
+        report: function that is called with the result of each step.
 
     Attributes:
         results: results of all steps so far.
@@ -103,7 +105,7 @@ class Procedure:
         return all(each.passed for each in self.results)
 
     def run(self) -> None:
-        """Run all steps.
+        """Run all steps of the test procedure.
 
         Raises:
             Quit: the operator ended the procedure.

@@ -153,7 +153,10 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time-out of the last command sent before a restart, or 0 if none of these is pending."""
+        """Time until which commands sent before a restart of the RRC may still get a reply, in us.
+
+        The time is 0 if no such command is waiting.
+        """
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 
@@ -167,9 +170,10 @@ class _UnconfirmedCommands:
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Remove the command that an OK confirms. Return the newest command of the same name.
+        """Remove the command that an OK confirms, and return the newest command of that name.
 
-        The newest command counts, because the RRC has executed it or will execute it. There is one
+        The OK belongs to the oldest waiting command of that name. The newest one is returned
+        because its values will apply: the RRC has executed it or will execute it. There is one
         exception: the RRC lost its power together with older commands, and this OK is the reply to
         the newest command.
         """
@@ -204,15 +208,15 @@ class _UnconfirmedCommands:
 
 
 class ReplyMatcher:
-    """A matcher that assigns each reply to its command.
+    """Assigns each reply of the RRC to the command it answers, and keeps track of its settings.
 
     Args:
-        max_refusals: number of successive refusals that is too many, 1 or more.
+        max_refusals: number of refusals in a row that counts as too many, 1 or more.
 
     Attributes:
-        settings: known settings of the RRC.
-        refusals: counter of successive refusals.
-        unconfirmed: commands that were sent without waiting.
+        settings: settings of the RRC, as far as known from confirmed commands.
+        refusals: counter of refusals in a row.
+        unconfirmed: commands that were sent without waiting and have no reply yet.
     """
 
     def __init__(self, max_refusals: int) -> None:
@@ -250,9 +254,9 @@ class ReplyMatcher:
             self.refusals.accepted(name)
 
     def initialized(self) -> None:
-        """Record that the RRC was initialized and has lost all settings.
+        """Record that the RRC was initialized (EV:Initialized) and has lost all settings.
 
-        A command that waited in the receive buffer of the RRC is still executed afterwards.
+        A command that was still in the receive buffer of the RRC is executed afterwards.
         """
         self.settings.clear()
         self.refusals.clear()

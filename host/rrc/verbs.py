@@ -39,7 +39,7 @@ _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """A record of a received signal. Loops check it, so that no call is interrupted.
+    """Record of a received signal. Loops check it and end, so a signal interrupts no call.
 
     Attributes:
         number: number of the first signal, or 0 if no signal was received.
@@ -54,11 +54,13 @@ class Ended:
 
 @contextmanager
 def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
-    """Open the port given on the command line, and guard the chair. At the end, stop the chair.
+    """Context manager that yields the wheelchair at the port given on the command line.
+
+    At the end, the chair is stopped.
 
     Args:
         ended: object that records the signals.
-        stable: whether stablemode is switched on, unless the call requires otherwise.
+        stable: whether stablemode is switched on. An option of the command line can prevent this.
 
     Raises:
         click.ClickException: the command failed. The message is one line, and the exit status is 1
@@ -127,9 +129,9 @@ class _DriveInput(Protocol):
     leaves: bool
 
     def poll(self, now_us: int) -> tuple[int, int]:
-        """Return the values to drive now, in per cent.
+        """Return the translation and rotation to drive now, in per cent.
 
-        The method raises ChairStopped if the terminal or the pad is gone.
+        The method raises ChairStopped if the terminal or the game pad is gone.
         """
         ...
 
