@@ -77,10 +77,16 @@ P = TypeVar("P", bound=AnyPort)
 def guarded(
     who: str, callback: Callable[A, ReturnCode], *args: A.args, **kwargs: A.kwargs
 ) -> ReturnCode:
-    """Run a callback and return its code. An exception is logged and counts as RTC_ERROR.
+    """Run a callback of a component, and return its code.
 
-    Every exception is caught, also from a listener of a port, so that a faulty component cannot end
-    the others.
+    An exception is logged and counts as RTC_ERROR, so that a faulty component cannot end the
+    others.
+
+    Args:
+        who: name of the component, for the log.
+        callback: callback to run.
+        args: positional arguments of the callback.
+        kwargs: keyword arguments of the callback.
     """
     try:
         return callback(*args, **kwargs)
@@ -95,12 +101,13 @@ def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
 
 
 class ComponentAction:
-    """The callbacks of a component. Each callback does nothing until a subclass overrides it.
+    """Base class with the callbacks of a component, each of which does nothing until it is overridden.
 
-    A callback returns RTC_OK or an error code. After an error code, the component goes to Error,
-    unless the docstring of the callback says otherwise. An exception is logged and counts as
-    RTC_ERROR. Callbacks must not wait, because time passes only between them. The argument `ec` is
-    the execution context that runs the callback. The time is `ec.now_us`.
+    A callback returns RTC_OK or an error code. After an error code, the component moves to the
+    Error state, unless the docstring of the callback states otherwise. An exception is logged and
+    counts as RTC_ERROR. A callback must not wait, because it would delay all components. The
+    argument `ec` is the execution context that runs the callback, and `ec.now_us` is the present
+    time.
     """
 
     def on_initialize(self) -> ReturnCode:
@@ -139,7 +146,7 @@ class ComponentAction:
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Do further work of a period in Active, after on_execute of all components of `ec`."""
+        """Do further work in each period while Active, after all components of `ec` did their on_execute."""
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
@@ -147,30 +154,31 @@ class ComponentAction:
         return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period of `ec` while the component is in Error.
+        """Do the work of a period of `ec` while the component is in the Error state.
 
-        The result is ignored.
+        The return value is ignored.
         """
         return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """React to a reset in Error.
+        """Prepare the component to leave the Error state, because a reset was requested.
 
-        If this returns RTC_OK, the component moves to Inactive in `ec`.
+        If this callback returns RTC_OK, the component moves to Inactive in `ec`. Otherwise, it
+        stays in Error.
         """
         return _OK
 
 
 @dataclass(frozen=True, slots=True)
 class ModuleSpec:
-    """The properties that all components of a class share (OpenRTM-aist 1.x, module profile).
+    """Description of a component type, shared by all its components (OpenRTM-aist 1.x, module profile).
 
     Attributes:
-        type_name: name of the class, such as `ConsoleIn`.
-        description: description of the class in one line.
-        version: version of the class.
-        vendor: vendor of the class.
-        category: purpose of the class, such as `sensor`.
+        type_name: name of the component type, such as `ConsoleIn`.
+        description: description of the type in one line.
+        version: version of the type.
+        vendor: vendor of the type.
+        category: purpose of the type, such as `sensor`.
     """
 
     type_name: str
@@ -182,7 +190,13 @@ class ModuleSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentProfile(ModuleSpec):
-    """The profile of a component, as in OpenRTM, with properties of its class and its own."""
+    """Description of one component, as in OpenRTM: its type, its name, its ports and its properties.
+
+    Attributes:
+        instance_name: name of the component.
+        port_profiles: descriptions of its ports.
+        properties: further properties of the component.
+    """
 
     instance_name: str
     port_profiles: tuple[PortProfile, ...]
@@ -231,7 +245,7 @@ class RtComponent(ComponentAction):
         )
 
     def add_port(self, port: P) -> P:
-        """Add a port.
+        """Add a port to the component. Subclasses call this method in their constructor.
 
         Args:
             port: data port or service port to add.
@@ -255,10 +269,10 @@ class RtComponent(ComponentAction):
         port.owner = ""
 
     def own(self, context: ExecutionContext) -> ReturnCode:
-        """Own an execution context and take part in it. The context ends with this component.
+        """Add the component to an execution context that is to end together with the component.
 
         Args:
-            context: execution context that the component will own.
+            context: execution context that the component owns from now on.
 
         Returns:
             The result of `ExecutionContext.add_component`.
@@ -269,11 +283,11 @@ class RtComponent(ComponentAction):
         return code
 
     def initialize(self) -> ReturnCode:
-        """Call on_initialize, make the component alive, and start its own execution contexts.
+        """Call on_initialize, make the component alive, and start the execution contexts that it owns.
 
         Returns:
-            PRECONDITION_NOT_MET unless the component is Created. Otherwise, the result of
-            on_initialize. If that result is not RTC_OK, the component stays Created.
+            PRECONDITION_NOT_MET if the component is already alive. Otherwise, the result of
+            on_initialize. If that result is not RTC_OK, the component stays in the state Created.
         """
         if self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -288,7 +302,7 @@ class RtComponent(ComponentAction):
         """Call on_finalize and end the component, regardless of the result of on_finalize.
 
         Returns:
-            PRECONDITION_NOT_MET in Created, or while the component takes part in an execution
+            PRECONDITION_NOT_MET if the component is not alive, or still takes part in an execution
             context. Otherwise, the result of on_finalize.
         """
         if not self.alive or self.contexts:
@@ -297,13 +311,15 @@ class RtComponent(ComponentAction):
         return guarded(self.instance_name, self.on_finalize)
 
     def exit(self) -> ReturnCode:
-        """Leave all execution contexts, stop the contexts that the component owns, and finalize.
+        """End the component: disconnect its ports, leave all execution contexts, and call on_finalize.
 
-        If the component is Active, on_deactivated is called first. Other components are removed
-        from the contexts that this component owns. Do not call this method from a callback.
+        If the component is Active, on_deactivated is called first. The execution contexts that the
+        component owns are stopped, and other components are removed from them. Do not call this
+        method from a callback.
 
         Returns:
-            PRECONDITION_NOT_MET in Created. Otherwise, the result of on_finalize.
+            PRECONDITION_NOT_MET if the component is not alive. Otherwise, the result of
+            on_finalize.
         """
         if not self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -344,9 +360,10 @@ class _Participant:
         self._updates = type(component).on_state_update is not base
 
     def request(self, source: LifeCycleState, wanted: LifeCycleState) -> ReturnCode:
-        """Request a move from one state to another.
+        """Request that the component moves from one state to another in the next period.
 
-        Return PRECONDITION_NOT_MET if the component is not in `source`, or is moving to Error.
+        Return PRECONDITION_NOT_MET if the component is not in the state `source`, or if its move to
+        Error is already planned.
         """
         if self.state is not source or self.wanted is _ERROR:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -354,14 +371,14 @@ class _Participant:
         return _OK
 
     def abort(self) -> None:
-        """Move to Error in the next pre-pass. Do nothing if the component is in Error."""
+        """Request that the component moves to Error in the next period, unless it is already in Error."""
         if self.state is not _ERROR:
             self.wanted = _ERROR
 
     def notify(self, callback: _Callback) -> ReturnCode:
-        """Run a callback and return its code.
+        """Run a callback of the component and return its code.
 
-        If the callback fails, the component moves to Error in the next pre-pass.
+        If the callback fails, the component moves to Error at the beginning of the next period.
         """
         code = self._call(callback)
         if code is not _OK:
@@ -452,14 +469,14 @@ _MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[_Participant
 
 
 class ExecutionContexts:
-    """A group of execution contexts that are ticked together, in the order of adding.
+    """A group of execution contexts, which a schedule ticks one after the other in the order of adding.
 
-    The object keeps the earliest due time. A tick before that time does not check the contexts,
-    which would take 11 us of each tick with 127 contexts.
+    The group stores the earliest due time of its contexts. A tick before that time skips the
+    contexts, because checking 127 contexts would take 11 us.
 
     Attributes:
-        quiet_us: time of the latest tick in which no context was due. The contexts do not store
-            this time.
+        quiet_us: time in us of the latest tick in which no context was due. The contexts do not
+            store this time themselves.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")
@@ -477,10 +494,10 @@ class ExecutionContexts:
         return self._due_us
 
     def tick(self, now_us: int) -> None:
-        """Run a period of each context that is due.
+        """Advance the time, and run one period of each execution context that is due.
 
         Args:
-            now_us: current time, which is never less than before.
+            now_us: current time in us, which is never less than before.
         """
         if now_us < self.due_us:
             self.quiet_us = now_us
@@ -567,10 +584,10 @@ class ExecutionContext:
         return tuple(participant.component for participant in self._participants)
 
     def tick(self, now_us: int) -> None:
-        """Advance the time, and run a period if one is due.
+        """Advance the time of the context, and run one period of its components if a period is due.
 
         Args:
-            now_us: the current time.
+            now_us: current time in us.
         """
         self._ticked_us = now_us
         if now_us < self.due_us:
@@ -583,11 +600,11 @@ class ExecutionContext:
                     step(participant)
 
     def start(self) -> ReturnCode:
-        """Start the context, and call on_startup of every participant.
+        """Start the execution context, and call on_startup of each of its components.
 
         Returns:
-            PRECONDITION_NOT_MET if the context runs or a participant is not alive. Otherwise,
-            RTC_OK.
+            PRECONDITION_NOT_MET if the context already runs or one of its components is not alive.
+            Otherwise, RTC_OK.
         """
         if self.running or not all(component.alive for component in self.components):
             return ReturnCode.PRECONDITION_NOT_MET
@@ -597,10 +614,12 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def stop(self) -> ReturnCode:
-        """Stop the context, and call on_shutdown of every participant. The states do not change.
+        """Stop the execution context, and call on_shutdown of each of its components.
+
+        The states of the components do not change.
 
         Returns:
-            PRECONDITION_NOT_MET unless the context runs. Otherwise, RTC_OK.
+            PRECONDITION_NOT_MET if the context does not run. Otherwise, RTC_OK.
         """
         if not self.running:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -610,7 +629,9 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def join(self, others: ExecutionContexts) -> None:
-        """Join a group of contexts as its last context. `Manager` calls this method.
+        """Make this execution context a member of a group that a schedule ticks.
+
+        `ExecutionContexts.add` and `ExecutionContexts.remove` call this method.
 
         Args:
             others: group of contexts, which is notified when the due time of this context changes.
@@ -626,13 +647,13 @@ class ExecutionContext:
             self._release(participant)
 
     def set_rate(self, rate_hz: float) -> ReturnCode:
-        """Change the rate, and call on_rate_changed of every participant.
+        """Change the rate of the execution context, and call on_rate_changed of each of its components.
 
         Args:
-            rate_hz: number of periods per second.
+            rate_hz: number of periods per second, 1 uHz to 1 MHz.
 
         Returns:
-            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz and the period of the rate is allowed.
+            BAD_PARAMETER if the rate is out of range or `allows_period` rejects its period.
             Otherwise, RTC_OK.
         """
         if not _possible(rate_hz):
@@ -646,13 +667,13 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def add_component(self, component: RtComponent) -> ReturnCode:
-        """Add a component as the last participant, in the state Inactive.
+        """Add a component to the execution context, as the last one in order and in the state Inactive.
 
         Args:
             component: component to add.
 
         Returns:
-            PRECONDITION_NOT_MET if the component takes part already. Otherwise, RTC_OK.
+            PRECONDITION_NOT_MET if the context already has this component. Otherwise, RTC_OK.
         """
         if self._find(component) is not None:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -662,14 +683,14 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def remove_component(self, component: RtComponent) -> ReturnCode:
-        """Remove a component from the participants.
+        """Remove a component that is not Active from the execution context.
 
         Args:
             component: component to remove.
 
         Returns:
-            BAD_PARAMETER if the component does not take part, or PRECONDITION_NOT_MET while it is
-            Active. Otherwise, RTC_OK.
+            BAD_PARAMETER if the context does not have this component, or PRECONDITION_NOT_MET if
+            the component is Active. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is not None and participant.state is LifeCycleState.ACTIVE:
@@ -677,13 +698,15 @@ class ExecutionContext:
         return self.release_component(component)
 
     def release_component(self, component: RtComponent) -> ReturnCode:
-        """Remove a component from the participants. If it is Active, call on_deactivated at once.
+        """Remove a component from the execution context, even if the component is Active.
+
+        If the component is Active, its on_deactivated is called at once.
 
         Args:
             component: component to remove.
 
         Returns:
-            BAD_PARAMETER if the component does not take part. Otherwise, RTC_OK.
+            BAD_PARAMETER if the context does not have this component. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is None:
@@ -692,52 +715,54 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def activate_component(self, component: RtComponent) -> ReturnCode:
-        """Request the move from Inactive to Active.
+        """Request that a component moves from Inactive to Active at the beginning of the next period.
 
         Args:
             component: component to activate.
 
         Returns:
-            BAD_PARAMETER if the component does not take part or is not alive, or
-            PRECONDITION_NOT_MET unless it is Inactive. Otherwise, RTC_OK.
+            BAD_PARAMETER if the component is not alive or not in this context, or
+            PRECONDITION_NOT_MET if it is not Inactive. Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.INACTIVE, LifeCycleState.ACTIVE)
 
     def deactivate_component(self, component: RtComponent) -> ReturnCode:
-        """Request the move from Active to Inactive.
+        """Request that a component moves from Active to Inactive at the beginning of the next period.
 
         Args:
             component: component to deactivate.
 
         Returns:
-            BAD_PARAMETER if the component does not take part or is not alive, or
-            PRECONDITION_NOT_MET unless it is Active and not on its way to Error. Otherwise, RTC_OK.
+            BAD_PARAMETER if the component is not alive or not in this context, or
+            PRECONDITION_NOT_MET if it is not Active or its move to Error is already planned.
+            Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.ACTIVE, LifeCycleState.INACTIVE)
 
     def reset_component(self, component: RtComponent) -> ReturnCode:
-        """Request the move from Error to Inactive.
+        """Request that a component moves from Error to Inactive at the beginning of the next period.
 
         Args:
             component: component to reset.
 
         Returns:
-            BAD_PARAMETER if the component does not take part or is not alive, or
-            PRECONDITION_NOT_MET unless it is in Error. Otherwise, RTC_OK.
+            BAD_PARAMETER if the component is not alive or not in this context, or
+            PRECONDITION_NOT_MET if it is not in Error. Otherwise, RTC_OK.
         """
         return self._request(component, LifeCycleState.ERROR, LifeCycleState.INACTIVE)
 
     def abort_component(self, component: RtComponent) -> ReturnCode:
-        """Request the move from Inactive or Active to Error, for a proxy whose device failed.
+        """Request that a component moves from Inactive or Active to Error in the next period.
 
-        OMG RTC has no such request. There, only a callback that fails leads to Error.
+        A component that represents a device uses this when the device fails. OMG RTC has no such
+        request: there, only a callback that fails leads to Error.
 
         Args:
             component: component to abort.
 
         Returns:
-            BAD_PARAMETER if the component does not take part or is not alive, or
-            PRECONDITION_NOT_MET if it is in Error. Otherwise, RTC_OK.
+            BAD_PARAMETER if the component is not alive or not in this context, or
+            PRECONDITION_NOT_MET if it is already in Error. Otherwise, RTC_OK.
         """
         participant = self._find(component)
         if participant is None or not component.alive:
@@ -748,9 +773,9 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def state_of(self, component: RtComponent) -> LifeCycleState:
-        """Return the state of a component in this context.
+        """Return the life-cycle state of a component in this execution context.
 
-        The state is Created if the component is not alive or does not take part in the context.
+        The state is Created if the component is not alive or not in this context.
         """
         participant = self._find(component)
         if participant is None or not component.alive:

@@ -36,10 +36,10 @@ _SEQ_PORTS: Final[Mapping[str, Any]] = {
 
 
 class ConsoleIn(RtComponent):
-    """A component that writes numbers entered by the user, one in each period.
+    """Example component that writes numbers entered by the user to its OutPort `out`, one per period.
 
-    The component of OpenRTM waits for a number. This component does not block. Instead, the owner
-    of the console calls `enter`.
+    The component of the same name in OpenRTM blocks until the user has typed a number. This
+    component does not block: the program that reads the console calls `enter` or `typed` instead.
 
     Attributes:
         waiting: numbers that were entered and not yet written.
@@ -57,7 +57,11 @@ class ConsoleIn(RtComponent):
         self.waiting.extend(numbers)
 
     def typed(self, line: str) -> None:
-        """Enter a number as text. Raise ValueError if the text is not a number, or out of range."""
+        """Enter a number that the user typed as text.
+
+        Raises:
+            ValueError: the text is not a number in the range -2**31..2**31-1.
+        """
         try:
             number = int(line)
         except ValueError:
@@ -74,11 +78,12 @@ class ConsoleIn(RtComponent):
 
 
 class ConsoleOut(RtComponent):
-    """A component that displays each number that arrives.
+    """Example component that displays each number that arrives at its InPort `in`.
 
     Attributes:
         received: all numbers that arrived, in order.
-        show: function that is called with each value. The owner of the console prints the value.
+        show: function that is called with each number to display it, or None. The program that owns
+            the console sets this function.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleOut", "Console output component")
@@ -99,12 +104,12 @@ class ConsoleOut(RtComponent):
 
 
 class SeqIn(RtComponent):
-    """A component that keeps the latest value of each port.
+    """Example component with an InPort for each of several types, which keeps the latest value of each.
 
-    The component of this name in OpenRTM displays the values instead.
+    The component of the same name in OpenRTM displays the values instead.
 
     Attributes:
-        ins: ports by name.
+        ins: InPorts by name, such as `Long` and `LongSeq`.
         latest: latest values by the name of their port.
     """
 
@@ -124,12 +129,13 @@ class SeqIn(RtComponent):
 
 
 class SeqOut(RtComponent):
-    """A component that writes increasing values to its ports in each period.
+    """Example component with an OutPort for each of several types, which writes counted values to them.
 
-    The component of this name in OpenRTM writes random values.
+    The values increase in each period. The component of the same name in OpenRTM writes random
+    values.
 
     Attributes:
-        outs: ports by name.
+        outs: OutPorts by name, such as `Long` and `LongSeq`.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SeqOut", "Sequence OutPort component")

@@ -80,13 +80,13 @@ class Constraint:
 
 
 class Parameter(Generic[V]):
-    """A parameter of a component. The type of the default is the type of the parameter.
+    """A configuration parameter of a component: its name, default value, constraint and present value.
 
     Args:
         name: name of the parameter in the configuration sets.
         default: default value, which is a bool, int, float, str or a tuple of one of these with at
-            least one element.
-        constraint: constraint that the values must meet.
+            least one element. Its type is the type of all values of the parameter.
+        constraint: constraint on the values in OpenRTM's notation, such as `0<=x<=10`.
         unit: unit of the value, for display.
         widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
 
@@ -108,10 +108,11 @@ class Parameter(Generic[V]):
             raise ValueError(f"{name} = {default!r} is not in its constraint {constraint}")
 
     def parse(self, text: str) -> V:
-        """Convert a text to a value of the parameter.
+        """Convert the text of a configuration set to a value of this parameter.
 
         Raises:
-            RtcRefused: the text is not a value of the type, or the constraint does not allow it.
+            RtcRefused: the text has another type than the parameter, or the constraint does not
+                allow the value.
         """
         try:
             value: V = self._read(text)
@@ -131,7 +132,10 @@ class Parameter(Generic[V]):
 
 
 def as_text(value: object) -> str:
-    """Convert a value to text for a configuration set. Commas separate the elements of a tuple."""
+    """Convert the value of a parameter to the text that a configuration set stores.
+
+    Commas separate the elements of a tuple.
+    """
     if isinstance(value, tuple):
         return ",".join(as_text(element) for element in value)
     return str(value).lower() if isinstance(value, bool) else str(value)
@@ -193,16 +197,17 @@ DEFAULT: Final = "default"
 
 
 class Configuration:
-    """The configuration sets of a component. Each set has values for the parameters; one is active.
+    """The configuration sets of a component, each with values for its parameters.
 
-    A change is checked at once. The change takes effect before the callbacks of the component's
+    One set is active.
+
+    A change is checked at once. The component gets the changed values before the callbacks of its
     next period, at `initialize`, or when `update` is called.
 
     Attributes:
-        active_id: ID of the set whose values apply, or will apply after the next update.
-        changed: whether there are changes for the next update.
-        on_update: function that is called with the ID of the active set after its values took
-            effect.
+        active_id: ID of the set whose values the component uses, or will use after the next update.
+        changed: whether there are changes that the next update will apply.
+        on_update: functions that are called after each update with the ID of the active set.
     """
 
     def __init__(self) -> None:
@@ -224,13 +229,13 @@ class Configuration:
     def bind(
         self, name: str, default: V, constraint: str = "", *, unit: str = "", widget: str = ""
     ) -> Parameter[V]:
-        """Add a parameter. The set `default` gets its default value.
+        """Add a parameter to the component, and store its default value in the set `default`.
 
         Args:
             name: name of the parameter in the configuration sets.
-            default: default value, which is a bool, int, float, str or a tuple of one of these. The
-                type of the default is the type of the values.
-            constraint: constraint that the values must meet, such as `0<=x<=10` (`Constraint`).
+            default: default value, which is a bool, int, float, str or a tuple of one of these. Its
+                type is the type of all values of the parameter.
+            constraint: constraint on the values, such as `0<=x<=10` (`Constraint`).
             unit: unit of the value, for display.
             widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
 
@@ -238,7 +243,7 @@ class Configuration:
             The parameter. Its attribute `value` is the present value.
 
         Raises:
-            ValueError: the constraint does not allow the default, or is not a constraint.
+            ValueError: the constraint does not allow the default, or its notation is unknown.
         """
         parameter = Parameter(name, default, constraint, unit=unit, widget=widget)
         self._parameters[name] = parameter
@@ -246,7 +251,12 @@ class Configuration:
         return parameter
 
     def set(self, name: str, text: str, set_id: str = "") -> None:
-        """Change a value in a set, or in the active set if no set is named.
+        """Change the value of a parameter in a configuration set.
+
+        Args:
+            name: name of the parameter.
+            text: new value as text.
+            set_id: ID of the set. By default, it is the active set.
 
         Raises:
             RtcRefused: the set or parameter is unknown, or the value is not allowed.
@@ -257,7 +267,12 @@ class Configuration:
         self.changed = True
 
     def add_set(self, set_id: str, values: Mapping[str, str]) -> None:
-        """Add or replace a set. A parameter that `values` leaves out has its default in the set.
+        """Add a configuration set, or replace the set with this ID.
+
+        Args:
+            set_id: ID of the set.
+            values: values as text, by the name of their parameter. Missing parameters have their
+                default.
 
         Raises:
             RtcRefused: a parameter is unknown, or a value is not allowed.
@@ -268,9 +283,10 @@ class Configuration:
         self.changed = True
 
     def remove_set(self, set_id: str) -> None:
-        """Remove a set.
+        """Remove a configuration set.
 
-        Raise RtcRefused if the set is unknown, the default set or the active set.
+        Raises:
+            RtcRefused: the set is unknown, the set `default`, or the active set.
         """
         self._set(set_id)
         if set_id in (DEFAULT, self.active_id):
@@ -278,7 +294,11 @@ class Configuration:
         del self._sets[set_id]
 
     def activate(self, set_id: str) -> None:
-        """Make a set active from the next update on. Raise RtcRefused if the set is unknown."""
+        """Make a configuration set active. Its values apply from the next update on.
+
+        Raises:
+            RtcRefused: the set is unknown.
+        """
         self._set(set_id)
         self.active_id, self.changed = set_id, True
 

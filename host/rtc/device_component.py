@@ -24,14 +24,14 @@ C = TypeVar("C", bound=_DeviceClient)
 
 
 class DeviceComponent(RtComponent, ABC, Generic[C]):
-    """A component that communicates with a device while it is Active, by a client for the device.
+    """Base class of components that communicate with a device through a client while they are Active.
 
     The component opens the client when it is activated, and closes it when it is deactivated. If
-    the line fails or the device refuses, the component logs the reason, closes the client and goes
-    to Error. The next activation opens a new client.
+    the connection fails or the device refuses a request, the component logs the reason, closes the
+    client and moves to Error. The next activation opens a new client.
 
     Attributes:
-        client: client that communicates with the device while the component is Active.
+        client: client for the device, or None while the component is not Active.
     """
 
     def __init__(self, instance_name: str) -> None:

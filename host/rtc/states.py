@@ -14,14 +14,14 @@ The minimum for connectors is one period in eleven days.
 
 
 class ReturnCode(IntEnum):
-    """The result of an operation or a callback (ReturnCode_t).
+    """Result of an operation or a callback of a component, with the numbers of OMG RTC (ReturnCode_t).
 
     Attributes:
         RTC_OK: the operation succeeded.
         RTC_ERROR: the operation failed.
         BAD_PARAMETER: an argument is invalid.
         UNSUPPORTED: the operation is not supported.
-        OUT_OF_RESOURCES: there is no more room.
+        OUT_OF_RESOURCES: memory or another resource is exhausted.
         PRECONDITION_NOT_MET: the operation is not allowed in the present state.
     """
 
@@ -51,10 +51,10 @@ class ExecutionKind(IntEnum):
 
 
 class RtcRefused(ValueError):  # noqa: N818 - what the model did
-    """An operation on components, ports or connectors is not possible.
+    """An operation on components, ports or connectors was refused because it is not possible.
 
     Attributes:
-        code: return code of OMG RTC for the refusal.
+        code: OMG RTC return code that describes the reason.
     """
 
     def __init__(self, message: str, code: ReturnCode = ReturnCode.BAD_PARAMETER) -> None:
@@ -63,10 +63,10 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
 
 
 class PortStatus(IntEnum):
-    """The result of an operation of a data port (OpenRTM-aist 1.x, DataPortStatus).
+    """Result of a read or write of a data port (OpenRTM-aist 1.x, DataPortStatus).
 
-    Codes that never occur here are left out. Only ports that are connected with ports of peers
-    return PORT_ERROR, BUFFER_EMPTY and CONNECTION_LOST.
+    The enumeration has only the codes that can occur here. PORT_ERROR, BUFFER_EMPTY and
+    CONNECTION_LOST occur only at ports that are connected with ports in other processes.
     """
 
     PORT_OK = 0

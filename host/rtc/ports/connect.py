@@ -22,19 +22,20 @@ def connect(
     name: str = "",
     connector_id: str = "",
 ) -> ConnectorBase:
-    """Connect an OutPort with an InPort, or two service ports, in any order.
+    """Connect an OutPort with an InPort, or two service ports with each other, and return the connector.
 
     Args:
-        first: first port.
-        second: second port.
-        properties: properties `dataport.*` of data ports; see `ConnectorOptions.parse`.
-        name: name of the connector. By default, it is the ID.
+        first: one of the two ports, in any order.
+        second: other port.
+        properties: properties `dataport.*` of a connector between data ports; see
+            `ConnectorOptions.parse`.
+        name: name of the connector, for display. By default, it is the ID.
         connector_id: ID that is unique in a system. By default, it is made from the names of the
             ports.
 
     Raises:
-        RtcRefused: the ports do not fit or are connected already, one of them has a connector with
-            this ID, or the properties are not possible.
+        RtcRefused: the ports do not fit or are already connected, one of them has a connector with
+            this ID, or a property has an invalid value.
     """
     if first is second:
         raise RtcRefused(f"{first.full_name} is one port; a connector joins two")

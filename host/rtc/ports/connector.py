@@ -194,9 +194,10 @@ class _Publisher(Generic[T]):
 
     @property
     def due_us(self) -> int:
-        """Time at which `take` has values to push.
+        """Time in us at which `take` will return values.
 
-        The time is in the past for a new value, or `NEVER` without a value.
+        The time is 0, so that it is due at once, if a new value waits with the subscription type
+        `new`. It is `NEVER` if no value waits.
         """
         if not len(self._values):
             return NEVER
@@ -234,15 +235,16 @@ class _Publisher(Generic[T]):
 
 
 class Connector(ConnectorBase, Generic[T]):
-    """A connector that moves values from an OutPort to an InPort.
+    """Connection between two data ports, which moves values from an OutPort to an InPort.
 
-    With `pull`, and with `push` and `flush`, a value can be read as soon as it is written. With
-    `new` and `periodic`, the value waits until a tick pushes it.
+    The InPort can read a value as soon as it is written if the dataflow type is `pull`, or if it is
+    `push` with the subscription type `flush`. With the subscription types `new` and `periodic`, the
+    value waits until a tick of the schedule pushes it.
 
     Args:
-        profile: profile of the connector.
-        ports: OutPort and InPort of the connector.
-        options: settings in the properties of the profile.
+        profile: name, ID, ports and properties of the connector.
+        ports: OutPort and InPort of the connector, in this order.
+        options: settings that were read from the properties of the profile.
 
     Attributes:
         buffer: buffer with the values that the InPort can read.
@@ -265,18 +267,19 @@ class Connector(ConnectorBase, Generic[T]):
 
     @property
     def due_us(self) -> int:
-        """Time at which `tick` has values to push.
+        """Time in us at which `tick` will push values to the InPort.
 
-        The time is in the past for a new value, or `NEVER` without a value.
+        The time is 0, so that it is due at once, if a new value waits with the subscription type
+        `new`. It is `NEVER` if no value waits.
         """
         return self._publisher.due_us if self._publisher else NEVER
 
     def write(self, value: T) -> PortStatus:
-        """Accept a value from the OutPort.
+        """Put a value that the OutPort writes into a buffer of the connector.
 
         Returns:
-            The status of the buffer that gets the value, such as PORT_OK. With `corba_cdr`,
-            INVALID_ARGS if a number does not fit its IDL type.
+            The status of the buffer, such as PORT_OK. With the interface type `corba_cdr`, the
+            status is INVALID_ARGS if a number does not fit its IDL type.
         """
         if self._encodes:
             try:

@@ -27,11 +27,11 @@ _OFFERED: Final[Mapping[str, str]] = {
 
 
 class DataPort(Port[Connector[T]], Generic[T]):
-    """A port that transfers values of one type.
+    """Base class of OutPort and InPort: a port that transfers values of one type.
 
     Args:
         name: name of the port, without the name of its component.
-        data_type: struct that the port carries.
+        data_type: struct type of the values, such as `TimedLong`.
     """
 
     def __init__(self, name: str, data_type: type[T]) -> None:
@@ -43,38 +43,38 @@ class DataPort(Port[Connector[T]], Generic[T]):
 
 
 class OutPort(DataPort[T]):
-    """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
+    """A data port to which a component writes values (OpenRTM-aist 1.x, OutPort).
 
-    Each connector gets each value, and transfers the value according to its `dataport.*` properties
-    (`ConnectorOptions.parse`).
+    Each connector of the port gets each value, and transfers the value according to its
+    `dataport.*` properties (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
 
     Args:
         name: name of the port without the name of its component, such as `out`.
-        data_type: struct that the port carries, such as `TimedLong`. InPorts of the same struct
-            fit.
+        data_type: struct type of the values, such as `TimedLong`. The port can be connected with
+            InPorts of the same type.
 
     Attributes:
-        data_type: struct that the port carries.
+        data_type: struct type of the values.
     """
 
     port_type = "DataOutPort"
 
     def write(self, value: T) -> PortStatus:
-        """Write a value to each connector, without waiting.
+        """Write a value to each connector of the port, without waiting.
 
         Args:
-            value: struct of the port's `data_type`. The numbers in the struct are checked only by
-                connectors with `corba_cdr`.
+            value: struct of the port's `data_type`. Only connectors with `corba_cdr` check that the
+                numbers in the struct fit their IDL types.
 
         Returns:
-            PORT_OK if all connectors accepted the value, or if there are no connectors. Otherwise
-        the status of the first connector that did not: BUFFER_FULL, BUFFER_TIMEOUT or
-        INVALID_ARGS. The result is PORT_ERROR if the write exceeds a limit of the node.
+            PORT_OK if all connectors accepted the value, or if there are no connectors. Otherwise,
+            the status of the first connector that did not accept it: BUFFER_FULL, BUFFER_TIMEOUT or
+            INVALID_ARGS. The result is PORT_ERROR if the write exceeds a limit of the node.
 
         Raises:
-            TypeError: the value has another type.
+            TypeError: the value has another type than the port.
         """
         if not isinstance(value, self.data_type):
             wanted = self.data_type.__name__
@@ -89,18 +89,18 @@ class OutPort(DataPort[T]):
 
 
 class InPort(DataPort[T]):
-    """A data port that a component reads (OpenRTM-aist 1.x, InPort).
+    """A data port from which a component reads values (OpenRTM-aist 1.x, InPort).
 
-    Each connector has its own buffer. The buffer of the connector that was made first is read
-    first.
+    Each connector of the port has its own buffer. If several buffers have values, the port reads
+    from the connector that was made first.
 
     Args:
         name: name of the port without the name of its component, such as `in`.
-        data_type: struct that the port carries, such as `TimedLong`. OutPorts of the same struct
-            fit.
+        data_type: struct type of the values, such as `TimedLong`. The port can be connected with
+            OutPorts of the same type.
 
     Attributes:
-        data_type: struct that the port carries.
+        data_type: struct type of the values.
     """
 
     port_type = "DataInPort"
@@ -118,11 +118,11 @@ class InPort(DataPort[T]):
         return False
 
     def read(self) -> T | None:
-        """Take the next value from the first buffer that has one, without waiting.
+        """Remove the next unread value from the buffer of a connector and return it, without waiting.
 
         Returns:
-            The next value. If there is no new value, the result is the value of the last read, or
-        None if nothing was read yet or the connector's `empty_policy` is not `readback`.
+            The next value. If there is no new value, the result is the value of the last read. It
+            is None if nothing was read yet, or if the connector's `empty_policy` is not `readback`.
         """
         for connector in self.connectors:
             if connector.buffer.readable:

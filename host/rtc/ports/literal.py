@@ -40,12 +40,14 @@ def literal(value: object) -> object:
 
 
 def read_literal(kind: type[S], given: object, now_us: int) -> S:
-    """Convert a JSON value to a struct. Missing fields have their default.
+    """Convert a JSON value, such as one from the command line, to a struct that a data port accepts.
+
+    Missing fields have their default.
 
     Args:
-        kind: type of the struct.
+        kind: struct type to create.
         given: value as `json.loads` returns it.
-        now_us: time for a struct with a time, if the value has no time.
+        now_us: time in us for a struct with a time stamp, if the JSON value has none.
 
     Raises:
         RtcRefused: the value does not fit the struct.

@@ -11,14 +11,14 @@ from tickrig.host.rtc.listeners import call_listeners
 
 @dataclass(frozen=True, slots=True)
 class ConnectorProfile:
-    """The profile of a connector, as in OpenRTM.
+    """Description of a connector between two ports: its name, ID, ports and properties, as in OpenRTM.
 
     Attributes:
         name: name of the connector, for display.
         connector_id: ID that is unique in a system.
-        ports: full names of both ports, with the providing port first. A port of a peer has the
-            name that its engine uses.
-        properties: properties of the connector, which are `dataport.*` for data ports.
+        ports: full names of both ports, such as `ConsoleIn0.out`. The port that provides the values
+            is first. A port in another process has the name that its engine uses.
+        properties: properties of the connector. Those of data ports begin with `dataport.`.
     """
 
     name: str
@@ -28,17 +28,21 @@ class ConnectorProfile:
 
 
 def automatic_id(ports: tuple[str, str]) -> str:
-    """Make the ID of a connector from the names of its ports. Equal runs have equal IDs."""
+    """Return the default ID of a connector, which is made from the names of its two ports.
+
+    The ID is therefore the same in each run of a system.
+    """
     return "_".join(ports)
 
 
 @dataclass(frozen=True, slots=True)
 class InterfaceProfile:
-    """An interface of a service port.
+    """Description of an interface that a service port provides or requires.
 
     Attributes:
         instance_name: name of the interface on the port.
-        type_name: name of the interface type. A consumer accepts only providers of the same type.
+        type_name: name of the interface type. A required interface can use only a provided
+            interface of the same type.
         polarity: `PROVIDED` or `REQUIRED`.
     """
 
@@ -49,12 +53,12 @@ class InterfaceProfile:
 
 @dataclass(frozen=True, slots=True)
 class PortProfile:
-    """The profile of a port, as in OpenRTM.
+    """Description of a port in its present state, as in OpenRTM.
 
     Attributes:
         name: full name, such as `ConsoleIn0.out`.
-        interfaces: interfaces of a service port.
-        connector_profiles: profiles of the port's connectors.
+        interfaces: interfaces of a service port, empty for a data port.
+        connector_profiles: descriptions of the connectors that the port has.
         properties: properties such as `port.port_type` and `dataport.data_type`.
     """
 
@@ -68,13 +72,13 @@ Listener = Callable[[ConnectorProfile], None]
 
 
 class ConnectorBase:
-    """A connector between two ports. Both ports have the connector until it ends.
+    """Base class of connectors, which connect two ports with each other until `end` is called.
 
     Attributes:
-        profile: profile of the connector.
-        ports: local ports of the connector: both ports, or a single one if the other port belongs
-        to a peer.
-        joined: whether the connector is joined, which is True between `begin` and `end`.
+        profile: name, ID, ports and properties of the connector.
+        ports: ports of the connector in this process: both ports, or one if the other port is in
+            another process.
+        joined: whether the ports are connected, which is True between `begin` and `end`.
     """
 
     def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, ...]) -> None:
@@ -94,10 +98,10 @@ class ConnectorBase:
         return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
-        """Add the connector to both ports, then notify the listeners of the ports.
+        """Connect the ports: add the connector to both ports, then notify the listeners of the ports.
 
         Raises:
-            RtcRefused: the guard of a port does not admit the connector.
+            RtcRefused: the guard of a port does not allow a further connector.
         """
         for port in self.ports:
             if port.guard is not None:
@@ -109,7 +113,10 @@ class ConnectorBase:
             port.notify(port.on_connect, self.profile)
 
     def end(self) -> None:
-        """Remove the connector from both ports, then notify the listeners. You may end it twice."""
+        """Disconnect the ports: remove the connector from both, then notify their listeners.
+
+        A second call has no effect.
+        """
         joined, self.joined = self.joined, False
         for port in self.ports if joined else ():
             port.detach(self)
@@ -121,13 +128,13 @@ C = TypeVar("C", bound=ConnectorBase)
 
 
 class PortGuard(Protocol):
-    """A guard that keeps a port within the limits of its node."""
+    """Limits that a node sets for a port. The port asks its guard before it connects or sends."""
 
     def admit(self, connector: ConnectorBase, /) -> None:
         """Raise RtcRefused if the port may not have this additional connector."""
 
     def passes(self, port: AnyPort, value: Any, /) -> bool:
-        """Return whether a port may send a value, or receive a value from a peer."""
+        """Return whether the node allows a port to send a value, or to receive it from another process."""
         ...
 
 
@@ -171,7 +178,7 @@ class Port(Generic[C]):
         return PortProfile(self.full_name, self._interfaces(), connectors, properties)
 
     def find_connector(self, connector_id: str) -> C | None:
-        """Return the connector with an ID.
+        """Return the connector of this port that has a given ID.
 
         Args:
             connector_id: ID in the profile of the connector.
@@ -183,13 +190,13 @@ class Port(Generic[C]):
         return next(found, None)
 
     def connector_to(self, other: AnyPort) -> C | None:
-        """Return the connector between this port and another port.
+        """Return the connector that connects this port with another port.
 
         Args:
-            other: other port of the connector.
+            other: port to which the connector leads.
 
         Returns:
-            The connector, or None if there is none.
+            The connector, or None if the two ports are not connected.
         """
         shared = (own for own in self.connectors if own in other.connectors)
         return next(shared, None) if other is not self else None
@@ -208,7 +215,14 @@ class Port(Generic[C]):
         self.connectors = tuple(c for c in self.connectors if c is not connector)
 
     def notify(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
-        """Call listeners with the profile of a connector. An exception of a listener is logged."""
+        """Call functions of `on_connect` or `on_disconnect` with the profile of a connector.
+
+        An exception of such a function is logged.
+
+        Args:
+            listeners: functions to call.
+            profile: profile of the connector.
+        """
         call_listeners(self.full_name, listeners, profile)
 
     def _properties(self) -> Mapping[str, str]:

@@ -45,14 +45,14 @@ class ReadPolicy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BufferOptions:
-    """The settings of a buffer.
+    """Settings of the buffer in which a connector keeps values (`RingBuffer`).
 
     Attributes:
         length: largest number of values in the buffer, 1 to 1 000 000.
         full: effect of a write to the full buffer.
         empty: effect of a read from the empty buffer.
-        read: policy that selects the value to read.
-        skip_count: number of values that are dropped before each read value, with the policy
+        read: policy that selects which waiting value is read.
+        skip_count: number of values that are dropped before each read value, if the read policy is
             `skip`.
 
     Raises:
@@ -74,9 +74,9 @@ class BufferOptions:
 
 
 class RingBuffer(Generic[T]):
-    """A buffer of values in the order of their arrival, up to a maximum length.
+    """Buffer of a connector for values that were written and not yet read, up to a maximum length.
 
-    Calls do not wait. If OpenRTM would block, the call here ends as after a time-out.
+    Calls do not wait. Where OpenRTM would block, the call here returns as after a time-out.
 
     Attributes:
         on_write: function that is called after a value was put into the buffer, or None.
@@ -105,8 +105,9 @@ class RingBuffer(Generic[T]):
         """Add a value at the end of the buffer.
 
         Returns:
-            PORT_OK, also if the oldest value was overwritten. If the buffer is full, the result is
-        BUFFER_FULL with `do_nothing`, and BUFFER_TIMEOUT with `block`.
+            PORT_OK, also if the oldest value was overwritten. If the buffer is full and its full
+            policy is not `overwrite`, the value is dropped. The result is then BUFFER_FULL with the
+            policy `do_nothing`, or BUFFER_TIMEOUT with `block`.
         """
         values, options = self._values, self._options
         if len(values) == options.length and options.full is not FullPolicy.OVERWRITE:
@@ -118,11 +119,11 @@ class RingBuffer(Generic[T]):
         return _OK
 
     def read(self) -> T | None:
-        """Take a value.
+        """Remove the next value from the buffer and return it. The read policy selects the value.
 
         Returns:
-            The value. If there is no new value, the result is the value that was read last with
-        `readback`, otherwise None.
+            The value. If there is no new value, the result is the value that was read last with the
+            empty policy `readback`, otherwise None.
         """
         values, skip = self._values, self._skip
         if len(values) <= skip:
@@ -133,7 +134,7 @@ class RingBuffer(Generic[T]):
         return self._last
 
     def pop(self) -> tuple[T, ...]:
-        """Take the oldest value, or return None if there is none."""
+        """Remove the oldest value. Return it in a tuple, which is empty if there is no value."""
         return (self._values.popleft(),) if self._values else ()
 
     def clear(self) -> tuple[T, ...]:

@@ -11,12 +11,12 @@ T = TypeVar("T")  # an interface: a Protocol
 
 
 class Provider(Generic[T]):
-    """An interface that a port provides.
+    """An interface that a service port provides. Consumers on other ports can call it.
 
     Args:
         instance_name: name of the interface on the port.
-        type_name: name of the interface type. Only consumers of the same type fit.
-        servant: object that executes the calls.
+        type_name: name of the interface type. Only consumers of the same type can be connected.
+        servant: object whose methods execute the calls.
     """
 
     def __init__(self, instance_name: str, type_name: str, servant: T) -> None:
@@ -25,10 +25,10 @@ class Provider(Generic[T]):
 
 
 class Consumer(Generic[T]):
-    """An interface that a port requires, such as `Consumer[RefHard]("refhard", "RefHard")`.
+    """An interface that a service port requires, such as `Consumer[RefHard]("refhard", "RefHard")`.
 
-    Calls are plain method calls, without another thread. An exception of the provider is raised in
-    the caller.
+    Once the port is connected, the component calls the methods of `service`. These are plain method
+    calls in the same thread. An exception of the provider is raised in the caller.
     """
 
     def __init__(self, instance_name: str, type_name: str) -> None:
@@ -52,7 +52,7 @@ class Consumer(Generic[T]):
         return self._provider.servant
 
     def take(self, provider: Provider[T] | None) -> None:
-        """Set the provider of the interface. None removes the present provider."""
+        """Set the provider whose servant is called. None removes the present provider."""
         self._provider = provider
 
 

@@ -39,25 +39,25 @@ class CallQueue:
         self._reader.setblocking(False)
 
     def fileno(self) -> int:
-        """Return a descriptor that can be read while calls wait for `make`, or -1 at the end."""
+        """Return a file descriptor that is readable while calls wait for `make`, or -1 after `close`."""
         return self._reader.fileno()
 
     def call(self, function: Callable[[], _R], timeout_us: int = CALL_TIMEOUT_US) -> _R:
         """Call a function in the manager's thread, and wait for its result.
 
-        If the caller is in that thread, the function is called at once.
+        If the caller is already in that thread, the function is called at once.
 
         Args:
             function: function to call, which must not wait.
-            timeout_us: longest time until the call begins.
+            timeout_us: longest time in us until the call begins.
 
         Returns:
             The result of the function.
 
         Raises:
-            TimeoutError: the function did not begin in time, and will not be called.
+            TimeoutError: the call did not begin in time. The function will not be called later.
             RtcRefused: the system has ended.
-            Exception: the exception that the function raised.
+            Exception: the function raised an exception.
         """
         if threading.get_ident() == self._owner:
             return function()
@@ -72,7 +72,9 @@ class CallQueue:
         raise TimeoutError(f"the system did not begin the call within {wait_s:g} s")
 
     def post(self, function: Callable[[], object]) -> None:
-        """Schedule a call of a function in the manager's thread. Errors of the function are logged.
+        """Schedule a call of a function in the manager's thread, without waiting for its result.
+
+        An exception of the function is logged.
 
         Raises:
             RtcRefused: the system has ended.
@@ -89,9 +91,10 @@ class CallQueue:
                 _fulfil(future, function)
 
     def serve(self, wait_us: int) -> None:
-        """Execute the waiting calls.
+        """Execute the waiting calls of other threads. If there are none, wait for the first one.
 
-        If there are none, wait for the first call, up to `wait_us`.
+        Args:
+            wait_us: longest wait in us.
         """
         wait_s = max(0, wait_us) / 1e6
         if self._closed:

@@ -23,9 +23,10 @@ _SPECIAL: Final = re.compile(r'([\\{}|<>" ])')
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A component, drawn as a box.
+    """A component in a Graphviz drawing of a system, where it is a box with its ports.
 
     Attributes:
+        name: name of the component.
         title: text below the name of the component.
         ins: names of the ports at the left of the box.
         outs: names of the other ports, at the right of the box.
@@ -41,10 +42,12 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A connection of two ports, by their full names.
+    """A connection of two ports in a Graphviz drawing of a system, where it is an arrow.
 
     Attributes:
-        dashed: whether the data bypass the PC.
+        source: full name of the port where the arrow begins, such as `ConsoleIn0.out`.
+        target: full name of the port where the arrow ends.
+        dashed: whether the arrow is dashed, because the data bypass the PC.
     """
 
     source: str
@@ -64,12 +67,18 @@ def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
 
 
 def system_graph(components: Iterable[Any]) -> str:
-    """Return the graph of a system, from the component descriptions that a control socket gives."""
+    """Return a drawing of a running system in the language of Graphviz.
+
+    The argument is the list of component descriptions that the system's control socket returns.
+    """
     return write_dot(*boxes_and_edges(components))
 
 
 def boxes_and_edges(components: Iterable[Any]) -> tuple[list[Box], list[Edge]]:
-    """Return the boxes and edges of a system, from the descriptions that a control socket gives."""
+    """Return the boxes (components) and edges (connections) that a drawing of a running system needs.
+
+    The argument is the list of component descriptions that the system's control socket returns.
+    """
     described = tuple(components)
     ends = dict.fromkeys(
         tuple(connector["ports"])

@@ -96,11 +96,11 @@ def _installed_type(name: str) -> type[RtComponent]:
 
 @dataclass(frozen=True, slots=True)
 class RemoteEntry:
-    """An entry for a component that runs in another process.
+    """Name and path of a component that runs in another process and is part of a system.
 
     Attributes:
         name: name of the component in the system, such as `Joystick0` in `Joystick0.out`.
-        path: path of the component for its engine, such as
+        path: path under which the engine finds the component, such as
             `localhost:2809/robot.host_cxt/Joystick0.rtc`.
     """
 
@@ -110,12 +110,12 @@ class RemoteEntry:
 
 @dataclass(frozen=True, slots=True)
 class RemoteConnection:
-    """A connector between a local port and a port of a component in another process.
+    """Description of a connector between a port in this process and a port in another process.
 
     Attributes:
-        port: full name of the local port.
-        remote: the component that runs elsewhere.
-        remote_port: port of that component, without the name of the component.
+        port: full name of the port in this process.
+        remote: component in the other process.
+        remote_port: name of the port in the other process, without the name of its component.
         ports: full names of both ports, in the order in which they were given.
         name: name of the connector, for display.
         properties: properties of the connector.
@@ -133,7 +133,7 @@ class RemoteConnection:
 
 @dataclass(slots=True)
 class Remotes:
-    """The components that run elsewhere, and the connectors to them, as in a system file."""
+    """Components of a system that run in other processes, and the connectors to them."""
 
     components: list[RemoteEntry] = field(default_factory=list)
     connections: list[RemoteConnection] = field(default_factory=list)
@@ -143,10 +143,10 @@ class Remotes:
 
 
 class NameService:
-    """A table of components by path, as rtshell writes paths: `localhost/ConsoleIn0.rtc`.
+    """Table of a manager's components by their path, such as `localhost/ConsoleIn0.rtc`.
 
-    These names exist only in this process. Not emulated: a CORBA naming service for other
-    processes.
+    The paths are written as in rtshell. They exist only in this process. Not emulated: a CORBA
+    naming service for other processes.
     """
 
     def __init__(self) -> None:
@@ -245,10 +245,10 @@ class Manager(Schedule):
         return tuple(profiles.values())
 
     def register(self, kind: type[RtComponent]) -> None:
-        """Register a class, so that `create` can create components of it.
+        """Register a component class, so that `create` can create components of this type.
 
         Args:
-            kind: class of components, which is registered under the type name of its `spec`.
+            kind: component class. Its type name is the one in its `spec`.
         """
         self._registered[kind.spec.type_name] = kind
 
@@ -259,15 +259,15 @@ class Manager(Schedule):
         rate_hz: float = DEFAULT_RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> RtComponent:
-        """Create a component of a type that is registered or installed, and add it; see `add`.
+        """Create a component of a type that is registered or installed, and add it to the system.
 
         Args:
-            type_name: name of the type, as registered, or as a package names it
+            type_name: name of the type, as registered or as an installed package names it
                 (docs/howto/extending.md).
-            instance_name: instance name. By default, it is the type name with the lowest free
-                number.
-            rate_hz: rate of the component's own execution context.
-            context: execution context of the component. By default, the component gets its own.
+            instance_name: name of the component. By default, it is the type name with the lowest
+                free number.
+            rate_hz: rate of the execution context that is made for the component.
+            context: existing execution context for the component. By default, a new one is made.
 
         Returns:
             The created component.
@@ -284,19 +284,19 @@ class Manager(Schedule):
         rate_hz: float = DEFAULT_RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> R:
-        """Initialize a component, name it, and start its execution context.
+        """Add an existing component to the system: initialize it, register its name, and run it.
 
         Args:
-            component: component to add, such as one of your own.
-            rate_hz: rate of the component's own execution context, 1 uHz to 1 MHz.
-            context: execution context of the component. By default, the component gets its own.
+            component: component to add, for example one of your own class.
+            rate_hz: rate of the execution context that is made for the component, 1 uHz to 1 MHz.
+            context: existing execution context for the component. By default, a new one is made.
 
         Returns:
             The added component.
 
         Raises:
-            RtcRefused: the name of the component is taken, or on_initialize failed.
-            ValueError: no execution context can have this rate.
+            RtcRefused: another component has the same name, or on_initialize failed.
+            ValueError: the rate is out of range.
         """
         name = component.instance_name
         if name in self._components:
@@ -316,7 +316,7 @@ class Manager(Schedule):
         return component
 
     def delete(self, name: str) -> None:
-        """End a component.
+        """End a component and remove it from the system.
 
         If a callback calls this method, the component ends at the end of the tick.
 
@@ -330,7 +330,7 @@ class Manager(Schedule):
         self.defer(lambda: self._end(component))
 
     def find(self, name: str) -> RtComponent:
-        """Return the component with a name.
+        """Return the component that has a given instance name or path.
 
         Args:
             name: instance name or path, such as `ConsoleIn0` or `localhost/ConsoleIn0.rtc`.
@@ -349,7 +349,7 @@ class Manager(Schedule):
         return component
 
     def port(self, name: str) -> AnyPort:
-        """Return the port with a name.
+        """Return the port that has a given full name or path.
 
         Args:
             name: full name or path of the port, such as `ConsoleIn0.out` or
@@ -377,22 +377,22 @@ class Manager(Schedule):
         name: str = "",
         connector_id: str = "",
     ) -> ConnectorProfile:
-        """Connect two ports.
+        """Connect two ports of the manager's components, and return the profile of the new connector.
 
         Args:
-            first: name of the first port, as `port` takes it.
-            second: name of the second port, as `port` takes it.
+            first: full name or path of one port, such as `ConsoleIn0.out`.
+            second: full name or path of the other port, such as `ConsoleOut0.in`.
             properties: properties of the connector, such as `{"dataport.subscription_type":
                 "new"}`. Other properties have OpenRTM's defaults.
             name: name of the connector, for display.
             connector_id: ID of the connector. By default, it is made from the names of the ports.
 
         Returns:
-            The connector that was made.
+            The profile of the connector.
 
         Raises:
             RtcRefused: there is no such port, the ports do not fit, another connector has this ID,
-                or the properties are not possible.
+                or a property has an invalid value.
         """
         if connector_id and connector_id in (other.connector_id for other in self.connectors):
             message = f"a connector {connector_id!r} is there already"
@@ -407,9 +407,9 @@ class Manager(Schedule):
         """End the connector between two ports.
 
         Args:
-            first: name of the first port, as `port` takes it.
-            second: name of the second port. If it belongs to no local component, use the name in
-                the profile of the connector.
+            first: full name or path of one port, such as `ConsoleIn0.out`.
+            second: full name or path of the other port. If that port belongs to another process,
+                use its name in the profile of the connector.
 
         Raises:
             RtcRefused: there is no such port, or the ports are not connected.
@@ -432,7 +432,7 @@ class Manager(Schedule):
         return next((one for one in found if set(one.profile.ports) == ends), None)
 
     def context_of(self, name: str) -> ExecutionContext:
-        """Return the first execution context of a component.
+        """Return the execution context that runs a component, or the first one if there are several.
 
         Args:
             name: instance name or path of the component.
@@ -441,14 +441,14 @@ class Manager(Schedule):
             The execution context.
 
         Raises:
-            RtcRefused: there is no such component, or it takes part in no execution context.
+            RtcRefused: there is no such component, or no execution context runs it.
         """
         if not (contexts := self.find(name).contexts):
             raise RtcRefused(f"{name} takes part in no execution context")
         return contexts[0]
 
     def state_of(self, name: str) -> LifeCycleState:
-        """Return the state of a component in its first execution context.
+        """Return the life-cycle state of a component, such as Inactive, in its first execution context.
 
         Args:
             name: instance name or path of the component.
@@ -457,48 +457,54 @@ class Manager(Schedule):
             The state.
 
         Raises:
-            RtcRefused: there is no such component, or it takes part in no execution context.
+            RtcRefused: there is no such component, or no execution context runs it.
         """
         return self.context_of(name).state_of(self.find(name))
 
     def activate(self, *names: str) -> None:
-        """Request the move to Active.
+        """Request that components move from Inactive to Active in their next period.
 
         Args:
-            names: names of the components. The requests are made one after the other.
+            names: instance names or paths of the components. The requests are made one after the
+                other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
+            RtcRefused: a component is unknown or not Inactive. The requests made before it remain
+                valid.
         """
         self._request("activate", ExecutionContext.activate_component, names)
 
     def deactivate(self, *names: str) -> None:
-        """Request the move to Inactive.
+        """Request that components move from Active to Inactive in their next period.
 
         Args:
-            names: names of the components. The requests are made one after the other.
+            names: instance names or paths of the components. The requests are made one after the
+                other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
+            RtcRefused: a component is unknown or not Active. The requests made before it remain
+                valid.
         """
         self._request("deactivate", ExecutionContext.deactivate_component, names)
 
     def reset(self, *names: str) -> None:
-        """Request the move from Error to Inactive.
+        """Request that components move from Error to Inactive in their next period.
 
         Args:
-            names: names of the components. The requests are made one after the other.
+            names: instance names or paths of the components. The requests are made one after the
+                other.
 
         Raises:
-            RtcRefused: a component is unknown or cannot make the move now. Earlier requests stay.
+            RtcRefused: a component is unknown or not in Error. The requests made before it remain
+                valid.
         """
         self._request("reset", ExecutionContext.reset_component, names)
 
     def free_name(self, type_name: str) -> str:
-        """Return a free instance name.
+        """Return an instance name for a new component that no other component has.
 
         Args:
-            type_name: beginning of the name.
+            type_name: type name of the component, with which the instance name begins.
 
         Returns:
             The type name with the lowest free number, such as `ConsoleIn0`.
@@ -508,7 +514,7 @@ class Manager(Schedule):
         )
 
     def path(self, name: str) -> str:
-        """Return the path of a component in the name service.
+        """Return the path that a component has in the manager's name service.
 
         Args:
             name: instance name of the component.

@@ -35,26 +35,26 @@ class _CallingThread(threading.Thread):
 
 
 def calls_run() -> bool:
-    """Return whether a thread that should end still executes a call.
+    """Return whether a `PeerThread` that was closed still executes a call into another process.
 
-    A process that ends during a call may abort or hang, because the call is in C++ code.
+    A process that ends during such a call may abort or hang, because the call is in C++ code.
     """
     threads = threading.enumerate()
     return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
 
 
 class PeerThread:
-    """A thread that makes calls to a peer, one after the other.
+    """A thread that makes the calls to one peer (a component in another process), one after the other.
 
     A call that hangs delays the calls after it, up to the time-out of the engine (1 s for a CORBA
-    call). The thread does not keep the process alive.
+    call). The thread is a daemon thread, so it does not keep the process alive.
 
     Args:
-        name: name of the peer, for display.
-        retry_us: time after which connectors repeat a call that had no answer.
+        name: name of the peer, for the log.
+        retry_us: time in us after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: time `retry_us` in seconds.
+        retry_s: same time in seconds.
     """
 
     def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
@@ -127,18 +127,18 @@ class PeerCaller(Protocol):
 
 
 class PeerThreads:
-    """Threads that make the calls of many connectors. Each connector makes one call at a time.
+    """A pool of threads that make the calls of many connectors to components in other processes.
 
-    As long as peers answer at once, there is one thread. This takes a third of the processor time
-    of one thread for each connector. If calls wait, a second thread is started, and one more for
-    each call that hangs.
+    Each connector makes one call at a time. While the calls are answered at once, one thread makes
+    them all, because one thread for each connector would take three times the processor time. If
+    calls have to wait, a second thread is started, and a further one for each call that hangs.
 
     Args:
-        name: name of the threads, for display.
-        retry_us: time after which connectors repeat a call that had no answer.
+        name: name of the threads, for the log.
+        retry_us: time in us after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: time `retry_us` in seconds.
+        retry_s: same time in seconds.
         running: number of running threads.
     """
 

@@ -46,10 +46,10 @@ def write_rts_profile(
     version: str = "1.0",
     date: str = "1970-01-01T00:00:00",
 ) -> str:
-    """Return the system of a manager as an RTSProfile.
+    """Return the system of a manager as an XML text in the format RTSProfile.
 
     Args:
-        manager: manager of the system.
+        manager: manager whose components and connectors are written.
         name: name of the system.
         vendor: vendor of the system.
         version: version of the system.
@@ -69,7 +69,7 @@ def write_rts_profile(
 
 
 def parse_rts_profile(text: str) -> System:
-    """Read a system from an RTSProfile.
+    """Read the description of a system from an XML text in the format RTSProfile.
 
     Raises:
         RtcRefused: the text is not XML, not an RTSProfile, or an incomplete RTSProfile.

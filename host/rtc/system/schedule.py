@@ -22,11 +22,12 @@ class ScheduledItem(Protocol):
 
 
 class Schedule:
-    """A schedule that runs the items that are due. It has no clock: `tick` gets the time.
+    """Runs the execution contexts and connectors of a system at their due times.
 
-    A tick has four steps: other items run, then the execution contexts run in the order in which
-    they were added, then connectors push, then deferred calls run. In virtual time, `run_to` ticks.
-    In real time, `RealTime` waits for `due_us` and ticks.
+    The schedule reads no clock, because the caller passes the time to `tick`. In virtual time,
+    `run_to` and `run_for` call `tick` without waiting. In real time, `RealTime` waits and calls it.
+    A tick has four steps: additional items run, then the execution contexts run in the order in
+    which they were added, then connectors push their values, then deferred calls run.
 
     Attributes:
         now_us: time of the latest tick in us.
@@ -42,7 +43,10 @@ class Schedule:
 
     @property
     def due_us(self) -> int:
-        """The next time at which there is work to do, or the present time if it is overdue."""
+        """Time in us at which `tick` must be called next.
+
+        It is the present time if work is overdue.
+        """
         due_us = self._contexts.due_us
         for connector in self._publishing:
             due_us = min(due_us, connector.due_us)
@@ -53,11 +57,11 @@ class Schedule:
     def tick(self, now_us: int) -> None:
         """Advance the time, and run all items that are due.
 
-        Args:
-            now_us: current time, which is never less than before.
+        Each execution context runs at most one period in a tick. Therefore call `tick` at each
+        `due_us`. Otherwise, periods are skipped.
 
-        Each execution context runs one period at most in a tick. Therefore call `tick` at each
-        `due_us`; otherwise periods are skipped.
+        Args:
+            now_us: current time in us, which is never less than before.
         """
         self.now_us, self._ticking = now_us, True
         for item in self._items:
@@ -70,10 +74,10 @@ class Schedule:
             self._deferred.pop(0)()
 
     def run_to(self, t_us: int) -> None:
-        """Run all items that are due up to and including a time, in virtual time without waiting.
+        """Run the system in virtual time, without waiting, up to and including a given time.
 
         Args:
-            t_us: time until which items run.
+            t_us: time in us at which the run ends.
         """
         while (due_us := self.due_us) <= t_us:
             self.tick(due_us)
@@ -82,15 +86,17 @@ class Schedule:
         self.tick(t_us)
 
     def run_for(self, duration_us: int) -> None:
-        """Run all items that are due in the next `duration_us`, in virtual time without waiting.
+        """Run the system in virtual time, without waiting, for a given duration.
 
         Args:
-            duration_us: length of the time in us.
+            duration_us: duration in us.
         """
         self.run_to(self.now_us + duration_us)
 
     def defer(self, action: Callable[[], None]) -> None:
-        """Call an action at once, or at the end of the tick if a tick is running.
+        """Call a function at once, or at the end of the tick if a tick is running.
+
+        A callback can thus request a change, such as the end of its own component.
 
         Args:
             action: function to call.
@@ -109,10 +115,10 @@ class Schedule:
         self._contexts.remove(context)
 
     def add_item(self, item: ScheduledItem) -> None:
-        """Add an item that is ticked from now on.
+        """Add an item that runs in each tick, before the execution contexts.
 
         Args:
-            item: object with a due time and a `tick`.
+            item: object with a due time and a method `tick`.
         """
         self._items += (item,)
 
@@ -140,9 +146,13 @@ class Clock(Protocol):
     """A clock that counts microseconds since its first wait."""
 
     def wait_until(self, t_us: int, /) -> int:
-        """Wait until the time is `t_us`.
+        """Wait until the clock has reached a time.
 
-        Return the delay in microseconds, which is 0 if on time.
+        Args:
+            t_us: time in us.
+
+        Returns:
+            The delay of the return in us, or 0 if it is on time.
         """
         ...
 
@@ -171,7 +181,10 @@ class RealTime:
         self.after_tick: list[Callable[[int], None]] = []
 
     def run(self) -> None:
-        """Run until `stop` is called, by a callback, a listener, or a client of the clock."""
+        """Run the schedule in real time until `stop` is called.
+
+        A callback, a listener, or a client that the clock serves can call `stop`.
+        """
         while self.running:
             self.step()
 

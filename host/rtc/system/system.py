@@ -22,17 +22,17 @@ _Sets = Mapping[str, Mapping[str, str]]
 
 @dataclass(frozen=True, slots=True)
 class ComponentEntry:
-    """The description of a component of a system.
+    """Description of a component in the description of a system.
 
     Attributes:
         name: instance name of the component.
-        type_name: type name of the component that is created.
-        rate_hz: rate of the component's execution context.
-        context: word that components in one execution context share, empty for a context of its
-            own.
+        type_name: name of the component type.
+        rate_hz: rate of the component's execution context in periods per second.
+        context: any word that is the same for all components in one shared execution context, or
+            empty if the component has its own.
         active: whether the component is activated.
         configuration_set: name of the active configuration set.
-        configuration: values of each configuration set.
+        configuration: values of each configuration set as text, by set and parameter name.
         path: path of the component in an RTSProfile, empty if there is none.
     """
 
@@ -48,10 +48,11 @@ class ComponentEntry:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionEntry:
-    """The description of a connector of a system, by the full names of its ports.
+    """Description of a connector in the description of a system.
 
     Attributes:
-        ports: full names of both ports, with the providing port first.
+        ports: full names of both ports, such as `ConsoleIn0.out`. The port that provides the values
+            is first.
         name: name of the connector, for display.
         properties: properties of the connector.
         connector_id: ID of the connector, empty if it is made from the names of the ports.
@@ -65,14 +66,14 @@ class ConnectionEntry:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """The description of a system: its components and connectors, in the order of making them.
+    """Description of a system, as in a system file: its components and connectors, in order of creation.
 
-    Not saved: values in ports and buffers, and the internal state of components.
+    Values in ports and buffers, and the internal state of components, are not part of it.
 
     Attributes:
-        components: the components that are made.
+        components: components that are created in this process.
         connections: connectors of the components, with each other and with remote components.
-        remotes: components that run elsewhere.
+        remotes: components that run in other processes.
     """
 
     components: tuple[ComponentEntry, ...] = ()
@@ -94,12 +95,14 @@ def describe(manager: Manager) -> System:
 
 
 def restore(manager: Manager, system: System) -> None:
-    """Make the components and connectors of a system, and activate components marked as active.
+    """Create the components and connectors that a system description lists, in a manager.
 
-    Connectors to remote components are put into `manager.remotes`, and an engine makes them.
+    Components that are marked as active are activated. Connectors to remote components are added to
+    `manager.remotes`, and an engine makes them later.
 
     Raises:
-        RtcRefused: a part cannot be made. All parts are then removed again.
+        RtcRefused: a component or connector cannot be created. All created components are then
+            removed again.
     """
     made: list[str] = []
     before = Remotes(list(manager.remotes.components), list(manager.remotes.connections))
@@ -113,14 +116,14 @@ def restore(manager: Manager, system: System) -> None:
 
 
 def with_remotes(system: System, types: Container[str]) -> System:
-    """Return a copy of a system in which components of unknown types are remote.
+    """Return a copy of a system description in which components of unknown types are remote ones.
 
-    Only components with a path become remote. The RTSProfile of a system that several processes run
-    has such components.
+    An RTSProfile can describe a system that several processes run. Its components that cannot be
+    created here therefore run elsewhere. Only components with a path can become remote ones.
 
     Args:
-        system: system that was read.
-        types: names of the types that can be created.
+        system: system description that was read.
+        types: names of the types that can be created in this process.
     """
     there = [one for one in system.components if one.path and one.type_name not in types]
     here = tuple(one for one in system.components if one not in there)
@@ -148,7 +151,10 @@ def _connection(one: ConnectorProfile | RemoteConnection) -> ConnectionEntry:
 
 
 def given_id(connector_id: str, ports: tuple[str, str]) -> str:
-    """Return the ID of a connector, or an empty text if it is the default ID."""
+    """Return the ID of a connector for a system file, or an empty text if it is the default ID.
+
+    The default ID is made from the names of the two ports, so a system file does not need it.
+    """
     return "" if connector_id == automatic_id(ports) else connector_id
 
 
@@ -229,9 +235,11 @@ def _configure(component: RtComponent, entry: ComponentEntry) -> None:
 
 
 def differences(wanted: System, found: System) -> Iterator[str]:
-    """Yield a line for each part of the wanted system that is missing or different.
+    """Compare two system descriptions. Yield a line for each part that is missing or different.
 
-    Additional parts of the found system do not matter.
+    Args:
+        wanted: description of the expected system.
+        found: description of the actual system. Additional parts in it are ignored.
     """
     there = {entry.name: entry for entry in found.components}
     for entry in wanted.components:

@@ -85,10 +85,10 @@ _TOP: Final[Schema] = {
 
 
 def parse_toml(content: str) -> System:
-    """Read a system file.
+    """Read the description of a system from the text of a system file in TOML.
 
     Raises:
-        RtcRefused: the file is not TOML, or a key or value is not in the table above.
+        RtcRefused: the text is not TOML, or it has an unknown key or an invalid value.
     """
     top = read_section(content)
     top.read(_TOP)
@@ -185,11 +185,14 @@ def read_system(path: Path) -> System:
 
 
 def lacking(path: Path, text: str) -> tuple[str, ...]:
-    """Compare a system with a file. Return a line for each part of the file that the system lacks.
+    """Compare a running system with a system file, and return what the running system lacks.
 
     Args:
-        path: path of the file in TOML or XML.
-        text: text of the system in the same format.
+        path: path of the system file in TOML or XML.
+        text: text that describes the running system, in the same format.
+
+    Returns:
+        A line for each part of the file that is missing or different.
 
     Raises:
         Refused: the file cannot be read.
@@ -217,7 +220,11 @@ def file_format(path: Path) -> str:
 
 
 def check_system(path: Path) -> None:
-    """Check before a run that a system can be written after the run. Raise Refused if not."""
+    """Check before a run that the system file can be written after the run.
+
+    Raises:
+        Refused: the file cannot be written, or the suffix of its name is not a known one.
+    """
     file_format(path)
     try:
         check_file(path, "system")
