@@ -101,7 +101,7 @@ def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
 
 
 class ComponentAction:
-    """Base class with the callbacks of a component, each of which does nothing until it is overridden.
+    """Base class with the callbacks of a component, which do nothing until they are overridden.
 
     A callback returns RTC_OK or an error code. After an error code, the component moves to the
     Error state, unless the docstring of the callback states otherwise. An exception is logged and
@@ -146,7 +146,7 @@ class ComponentAction:
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Do further work in each period while Active, after all components of `ec` did their on_execute."""
+        """Do further work of a period in Active, after on_execute of all components in `ec`."""
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
@@ -171,7 +171,7 @@ class ComponentAction:
 
 @dataclass(frozen=True, slots=True)
 class ModuleSpec:
-    """Description of a component type, shared by all its components (OpenRTM-aist 1.x, module profile).
+    """Description of a component type, such as `ConsoleIn` (OpenRTM-aist 1.x, module profile).
 
     Attributes:
         type_name: name of the component type, such as `ConsoleIn`.
@@ -190,7 +190,7 @@ class ModuleSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentProfile(ModuleSpec):
-    """Description of one component, as in OpenRTM: its type, its name, its ports and its properties.
+    """Description of one component, as in OpenRTM: its type, name, ports and properties.
 
     Attributes:
         instance_name: name of the component.
@@ -283,7 +283,7 @@ class RtComponent(ComponentAction):
         return code
 
     def initialize(self) -> ReturnCode:
-        """Call on_initialize, make the component alive, and start the execution contexts that it owns.
+        """Call on_initialize, make the component alive, and start the contexts that it owns.
 
         Returns:
             PRECONDITION_NOT_MET if the component is already alive. Otherwise, the result of
@@ -311,7 +311,7 @@ class RtComponent(ComponentAction):
         return guarded(self.instance_name, self.on_finalize)
 
     def exit(self) -> ReturnCode:
-        """End the component: disconnect its ports, leave all execution contexts, and call on_finalize.
+        """End the component: disconnect its ports, leave its execution contexts, call on_finalize.
 
         If the component is Active, on_deactivated is called first. The execution contexts that the
         component owns are stopped, and other components are removed from them. Do not call this
@@ -371,7 +371,7 @@ class _Participant:
         return _OK
 
     def abort(self) -> None:
-        """Request that the component moves to Error in the next period, unless it is already in Error."""
+        """Request the move of the component to Error, unless it is already in Error."""
         if self.state is not _ERROR:
             self.wanted = _ERROR
 
@@ -469,10 +469,11 @@ _MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[_Participant
 
 
 class ExecutionContexts:
-    """A group of execution contexts, which a schedule ticks one after the other in the order of adding.
+    """Group of execution contexts that a schedule ticks one after the other.
 
-    The group stores the earliest due time of its contexts. A tick before that time skips the
-    contexts, because checking 127 contexts would take 11 us.
+    The contexts run in the order in which they were added. The group stores the earliest due time
+    of its contexts. A tick before that time skips the contexts, because checking 127 contexts would
+    take 11 us.
 
     Attributes:
         quiet_us: time in us of the latest tick in which no context was due. The contexts do not
@@ -647,7 +648,7 @@ class ExecutionContext:
             self._release(participant)
 
     def set_rate(self, rate_hz: float) -> ReturnCode:
-        """Change the rate of the execution context, and call on_rate_changed of each of its components.
+        """Change the rate of the execution context, and call on_rate_changed of its components.
 
         Args:
             rate_hz: number of periods per second, 1 uHz to 1 MHz.
@@ -667,7 +668,7 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def add_component(self, component: RtComponent) -> ReturnCode:
-        """Add a component to the execution context, as the last one in order and in the state Inactive.
+        """Add a component to the end of the execution context's order, in the state Inactive.
 
         Args:
             component: component to add.
@@ -715,7 +716,7 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def activate_component(self, component: RtComponent) -> ReturnCode:
-        """Request that a component moves from Inactive to Active at the beginning of the next period.
+        """Request that a component moves from Inactive to Active in the next period.
 
         Args:
             component: component to activate.
@@ -727,7 +728,7 @@ class ExecutionContext:
         return self._request(component, LifeCycleState.INACTIVE, LifeCycleState.ACTIVE)
 
     def deactivate_component(self, component: RtComponent) -> ReturnCode:
-        """Request that a component moves from Active to Inactive at the beginning of the next period.
+        """Request that a component moves from Active to Inactive in the next period.
 
         Args:
             component: component to deactivate.
@@ -740,7 +741,7 @@ class ExecutionContext:
         return self._request(component, LifeCycleState.ACTIVE, LifeCycleState.INACTIVE)
 
     def reset_component(self, component: RtComponent) -> ReturnCode:
-        """Request that a component moves from Error to Inactive at the beginning of the next period.
+        """Request that a component moves from Error to Inactive in the next period.
 
         Args:
             component: component to reset.

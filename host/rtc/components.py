@@ -36,7 +36,7 @@ _SEQ_PORTS: Final[Mapping[str, Any]] = {
 
 
 class ConsoleIn(RtComponent):
-    """Example component that writes numbers entered by the user to its OutPort `out`, one per period.
+    """Example component that writes the user's numbers to its OutPort `out`, one per period.
 
     The component of the same name in OpenRTM blocks until the user has typed a number. This
     component does not block: the program that reads the console calls `enter` or `typed` instead.
@@ -104,7 +104,7 @@ class ConsoleOut(RtComponent):
 
 
 class SeqIn(RtComponent):
-    """Example component with an InPort for each of several types, which keeps the latest value of each.
+    """Example component that has InPorts of ten types and keeps the latest value of each.
 
     The component of the same name in OpenRTM displays the values instead.
 
@@ -129,7 +129,7 @@ class SeqIn(RtComponent):
 
 
 class SeqOut(RtComponent):
-    """Example component with an OutPort for each of several types, which writes counted values to them.
+    """Example component that has OutPorts of ten types and writes counted values to them.
 
     The values increase in each period. The component of the same name in OpenRTM writes random
     values.

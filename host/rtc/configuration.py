@@ -80,7 +80,7 @@ class Constraint:
 
 
 class Parameter(Generic[V]):
-    """A configuration parameter of a component: its name, default value, constraint and present value.
+    """Configuration parameter of a component: its name, default, constraint and present value.
 
     Args:
         name: name of the parameter in the configuration sets.

@@ -24,7 +24,7 @@ C = TypeVar("C", bound=_DeviceClient)
 
 
 class DeviceComponent(RtComponent, ABC, Generic[C]):
-    """Base class of components that communicate with a device through a client while they are Active.
+    """Base class of components that communicate with a device while they are Active.
 
     The component opens the client when it is activated, and closes it when it is deactivated. If
     the connection fails or the device refuses a request, the component logs the reason, closes the

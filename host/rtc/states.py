@@ -14,7 +14,7 @@ The minimum for connectors is one period in eleven days.
 
 
 class ReturnCode(IntEnum):
-    """Result of an operation or a callback of a component, with the numbers of OMG RTC (ReturnCode_t).
+    """Result of an operation or a callback of a component (OMG RTC, ReturnCode_t).
 
     Attributes:
         RTC_OK: the operation succeeded.

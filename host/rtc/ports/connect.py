@@ -22,7 +22,7 @@ def connect(
     name: str = "",
     connector_id: str = "",
 ) -> ConnectorBase:
-    """Connect an OutPort with an InPort, or two service ports with each other, and return the connector.
+    """Connect an OutPort with an InPort, or two service ports, and return the connector.
 
     Args:
         first: one of the two ports, in any order.

@@ -118,7 +118,7 @@ class InPort(DataPort[T]):
         return False
 
     def read(self) -> T | None:
-        """Remove the next unread value from the buffer of a connector and return it, without waiting.
+        """Return the next unread value and remove it from its buffer, without waiting.
 
         Returns:
             The next value. If there is no new value, the result is the value of the last read. It

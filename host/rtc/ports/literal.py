@@ -40,7 +40,7 @@ def literal(value: object) -> object:
 
 
 def read_literal(kind: type[S], given: object, now_us: int) -> S:
-    """Convert a JSON value, such as one from the command line, to a struct that a data port accepts.
+    """Convert a JSON value to a struct that a data port can transfer.
 
     Missing fields have their default.
 

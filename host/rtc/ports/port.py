@@ -11,7 +11,7 @@ from tickrig.host.rtc.listeners import call_listeners
 
 @dataclass(frozen=True, slots=True)
 class ConnectorProfile:
-    """Description of a connector between two ports: its name, ID, ports and properties, as in OpenRTM.
+    """Description of a connector, as in OpenRTM: its name, ID, ports and properties.
 
     Attributes:
         name: name of the connector, for display.
@@ -98,7 +98,7 @@ class ConnectorBase:
         return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
-        """Connect the ports: add the connector to both ports, then notify the listeners of the ports.
+        """Connect the ports: add the connector to both, then notify their listeners.
 
         Raises:
             RtcRefused: the guard of a port does not allow a further connector.
@@ -134,7 +134,7 @@ class PortGuard(Protocol):
         """Raise RtcRefused if the port may not have this additional connector."""
 
     def passes(self, port: AnyPort, value: Any, /) -> bool:
-        """Return whether the node allows a port to send a value, or to receive it from another process."""
+        """Return whether a port may send a value, or receive it from another process."""
         ...
 
 

@@ -39,7 +39,7 @@ class CallQueue:
         self._reader.setblocking(False)
 
     def fileno(self) -> int:
-        """Return a file descriptor that is readable while calls wait for `make`, or -1 after `close`."""
+        """Return a file descriptor that is readable while calls wait, or -1 after `close`."""
         return self._reader.fileno()
 
     def call(self, function: Callable[[], _R], timeout_us: int = CALL_TIMEOUT_US) -> _R:

@@ -75,7 +75,7 @@ def system_graph(components: Iterable[Any]) -> str:
 
 
 def boxes_and_edges(components: Iterable[Any]) -> tuple[list[Box], list[Edge]]:
-    """Return the boxes (components) and edges (connections) that a drawing of a running system needs.
+    """Return the components (boxes) and connections (edges) of a running system for a drawing.
 
     The argument is the list of component descriptions that the system's control socket returns.
     """

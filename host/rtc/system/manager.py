@@ -377,7 +377,7 @@ class Manager(Schedule):
         name: str = "",
         connector_id: str = "",
     ) -> ConnectorProfile:
-        """Connect two ports of the manager's components, and return the profile of the new connector.
+        """Connect two ports of the manager's components.
 
         Args:
             first: full name or path of one port, such as `ConsoleIn0.out`.
@@ -432,7 +432,7 @@ class Manager(Schedule):
         return next((one for one in found if set(one.profile.ports) == ends), None)
 
     def context_of(self, name: str) -> ExecutionContext:
-        """Return the execution context that runs a component, or the first one if there are several.
+        """Return the (first) execution context that runs a component.
 
         Args:
             name: instance name or path of the component.
@@ -448,7 +448,7 @@ class Manager(Schedule):
         return contexts[0]
 
     def state_of(self, name: str) -> LifeCycleState:
-        """Return the life-cycle state of a component, such as Inactive, in its first execution context.
+        """Return the life-cycle state of a component in its (first) execution context.
 
         Args:
             name: instance name or path of the component.

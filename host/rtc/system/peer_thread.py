@@ -44,7 +44,7 @@ def calls_run() -> bool:
 
 
 class PeerThread:
-    """A thread that makes the calls to one peer (a component in another process), one after the other.
+    """Thread that makes the calls to one peer, a component in another process, one by one.
 
     A call that hangs delays the calls after it, up to the time-out of the engine (1 s for a CORBA
     call). The thread is a daemon thread, so it does not keep the process alive.

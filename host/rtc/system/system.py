@@ -66,7 +66,7 @@ class ConnectionEntry:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """Description of a system, as in a system file: its components and connectors, in order of creation.
+    """Description of a system, as in a system file: its components and their connectors.
 
     Values in ports and buffers, and the internal state of components, are not part of it.
 
