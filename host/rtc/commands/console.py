@@ -31,12 +31,12 @@ def _is_typed_to(component: object) -> TypeGuard[_TypedTo]:
 
 
 class Console:
-    """A console that shows the output of components, such as `ConsoleOut0 5`.
+    """Console of a running system, which shows the output of components, such as `ConsoleOut0 5`.
 
-    A typed line goes to each component that accepts it. If no component accepts the line, the
-    console prints the reason. A component may have the attributes `report` and `prompt`. The
-    console sets `report` to a function that shows a line, and `prompt` to a function that shows a
-    line only on a terminal.
+    A line that the user types goes to each component that accepts it. If no component accepts the
+    line, the console prints the reason. A component may have the attributes `report` and `prompt`.
+    The console sets `report` to a function that shows a line, and `prompt` to a function that shows
+    a line only on a terminal.
 
     Args:
         manager: manager with the components.
@@ -44,7 +44,7 @@ class Console:
         warn: function that prints a line that is only for the user.
 
     Attributes:
-        is_open: whether more lines may be typed, which is False once the standard input ends.
+        is_open: whether more lines may be typed. It is False once the standard input has ended.
     """
 
     def __init__(

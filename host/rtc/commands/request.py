@@ -23,7 +23,10 @@ ERROR: Final = "ERROR"
 
 
 def default_path() -> Path:
-    """Return the default path of a control socket: `tickrig-rtc` in a folder of this user."""
+    """Return the default path of the control socket through which commands reach a running system.
+
+    It is `tickrig-rtc` in the run-time folder or the temporary folder of the user.
+    """
     folder = os.environ.get("XDG_RUNTIME_DIR")
     if folder:
         return Path(folder, "tickrig-rtc")
@@ -47,9 +50,14 @@ at: Final[Decorator] = click.option(
 
 
 def request_system(socket: Path, do: str, /, **fields: object) -> Any:
-    """Send a request to a running system and return its answer.
+    """Send a request to the control socket of a running system, and return the answer.
 
     Raise Refused if the system does not answer, or answers with an error.
+
+    Args:
+        socket: control socket of the system.
+        do: name of the request, such as `describe`.
+        fields: further fields of the request.
     """
     return request(socket, SYSTEM, do, **fields)
 
@@ -86,17 +94,18 @@ complete_type: Final = _completer(lambda system: system["types"])
 
 
 def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
-    """Wait until a component has reached the wanted state.
+    """Wait until a component of a running system has reached the wanted life-cycle state.
 
     Args:
         socket: control socket of the system.
         name: name of the component.
-        wanted: name of the wanted life-cycle state.
-        wait_us: time to wait. 0 returns without waiting.
+        wanted: name of the wanted life-cycle state, such as `ACTIVE`.
+        wait_us: longest wait in us. 0 returns at once, without a check.
 
     Raises:
         Refused: the component or its system is gone.
-        click.ClickException: the component moved to Error instead, or the time is over.
+        click.ClickException: the component moved to Error instead, or did not reach the state in
+            time.
     """
     start_s = time.monotonic()
     while wait_us:

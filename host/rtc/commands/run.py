@@ -47,7 +47,7 @@ class _SystemOptions:
 
 
 def run_system(lite_boot: str, **given: Any) -> None:
-    """Run the system of a command line until it is stopped.
+    """Run a system of RT components in real time until it is stopped (command `tickrig rtc run`).
 
     Raises:
         Refused: the command line is invalid.

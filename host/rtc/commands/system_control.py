@@ -56,12 +56,11 @@ class _WatchedPort:
 
 
 class Probes:
-    """Probes that watch the values of OutPorts, and inject values into InPorts.
+    """Probes that read the values of OutPorts for the user, and write the user's values to InPorts.
 
-    Each probe has a connector of its own.
-
-    The connectors belong to no component, so a saved system does not contain them. A connector that
-    injects a value ends when the value was read.
+    Each probe is a port without a component, with a connector of its own. A saved system therefore
+    does not contain these connectors. A connector that injects a value ends when the value was
+    read.
 
     Args:
         manager: manager with the ports.
@@ -73,14 +72,17 @@ class Probes:
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
     def watch(self, name: str, since: int = 0) -> tuple[tuple[_NumberedValue, ...], int]:
-        """Watch an OutPort from the first call on. Return the values that the port wrote.
+        """Return the values that an OutPort has written since a previous call.
+
+        The first call starts this.
 
         Args:
-            name: name of the port, as in `Manager.port`.
-            since: number of the last value that the caller knows.
+            name: full name or path of the port, such as `ConsoleIn0.out`.
+            since: number of the latest value that the caller already has, or 0 for all.
 
         Returns:
-            The values after `since`, at most 1000, and the number of the latest value.
+            The values with a number above `since`, at most 1000, and the number of the latest
+            value.
 
         Raises:
             RtcRefused: there is no such port, or the port is not an OutPort.
@@ -94,11 +96,11 @@ class Probes:
         return tuple(seen for seen in watch.seen if seen.number > since), watch.count
 
     def inject(self, name: str, given: object) -> Struct:
-        """Write a value to an InPort as a connected OutPort would. Return the value.
+        """Write a value to an InPort as a connected OutPort would, and return the value.
 
         Args:
-            name: name of the port, as in `Manager.port`.
-            given: the value as JSON; see `literal`.
+            name: full name or path of the port, such as `ConsoleOut0.in`.
+            given: value as parsed JSON; see `literal`.
 
         Raises:
             RtcRefused: there is no such port, the port is not an InPort, or the value does not fit.
@@ -156,11 +158,13 @@ class _Runner(Protocol):
 
 
 class SystemControl(RequestDispatcher):
-    """The control of one system, which answers requests. The system must not tick during a request.
+    """Answers the requests to the control socket of a running system, such as `describe`.
+
+    The system must not tick during a request.
 
     Args:
         manager: manager of the system.
-        runner: runner of the system.
+        runner: object that runs the system, such as `RealTime`.
     """
 
     def __init__(self, manager: Manager, runner: _Runner) -> None:
@@ -188,9 +192,13 @@ class SystemControl(RequestDispatcher):
         )
 
     def saved(self, what: str) -> str:
-        """Return the system as text for a file, in the format `toml` or `xml`.
+        """Return the description of the running system as text for a system file.
 
-        Raise ValueError for another format.
+        Args:
+            what: format of the file, `toml` or `xml`.
+
+        Raises:
+            ValueError: the format is another one.
         """
         match what:
             case "toml":

@@ -44,11 +44,11 @@ def _component_row(component: Any) -> str:
 
 
 def component_lines(component: Any, *, long: bool) -> Iterator[str]:
-    """Return the lines that the command `cat` prints for a component.
+    """Return the lines with which the command `tickrig rtc cat` describes a component.
 
     Args:
-        component: description of the component.
-        long: whether to show the properties of connectors, and all configuration sets.
+        component: description of the component, as the control socket returns it.
+        long: whether to show also the properties of connectors, and all configuration sets.
     """
     yield f"{component['name']}  {component['state'].capitalize()}"
     yield f"  {'Path':<14}{component['path']}"

@@ -99,11 +99,11 @@ def _connector_rows(component: Any, port: str) -> Iterator[CursorRow[_Setting]]:
 
 
 class SystemScreen(FramedApp):
-    """A screen that shows a running system, and changes it by keys and mouse.
+    """Terminal editor for a running system: it draws the system, and changes it by keys and mouse.
 
     Args:
-        link: link to the system.
-        name: name of the system.
+        link: link to the control socket of the system.
+        name: name of the system, for display.
     """
 
     TITLE = "RT System Editor"
@@ -155,7 +155,10 @@ class SystemScreen(FramedApp):
         self.set_interval(PAINT_S, self.look)
 
     def look(self) -> None:
-        """Show the present state. The app calls this ten times a second, and after each command."""
+        """Update the screen with the present state of the system.
+
+        The app calls this method ten times a second, and after each command.
+        """
         for answer in self._link.take_answers():
             if answer.text:
                 self.notify(answer.text, severity="error" if answer.refused else "information")
@@ -240,7 +243,10 @@ class SystemScreen(FramedApp):
             )
 
     def action_edit(self) -> None:
-        """Ask for the value of the row under the cursor. If the row is a set, activate the set."""
+        """Ask the user for a new value of the parameter under the cursor, and set it.
+
+        If the row under the cursor is a configuration set, activate the set instead.
+        """
         component, row = self._component(), self.details.row
         if component is None or row is None or row.item == _Setting() or row.item.peer:
             self._refuse("go to a parameter or set in the details (Tab)")
@@ -257,7 +263,7 @@ class SystemScreen(FramedApp):
         QuestionScreen(f"{name}: {parameter}{where}", value).prompt(self, answered)
 
     def action_add_set(self) -> None:
-        """Ask for a name, and make a configuration set like the set under the cursor."""
+        """Ask for a name, and add a configuration set that copies the set under the cursor."""
         component, row = self._component(), self.details.row
         if component is None or not component["configuration"]["parameters"]:
             self._refuse("go to a component with parameters")
@@ -309,7 +315,10 @@ def _written(path: Path) -> Callable[[Object], str]:
 
 
 def edit_system(at: Path) -> None:
-    """Show a system on the terminal until its user leaves.
+    """Show a running system in the terminal editor until the user ends the editor.
+
+    Args:
+        at: control socket of the system.
 
     Raises:
         Refused: no system answers, or there is no terminal.

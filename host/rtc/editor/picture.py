@@ -88,11 +88,11 @@ class _Place(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A picture of a system.
+    """A system drawn as text for a terminal, with boxes for components and lines for connectors.
 
     Attributes:
-        lines: lines of text with styles.
-        places: places of boxes by name, and of ports by full name.
+        lines: lines of the drawing, with styles.
+        places: positions of boxes by name, and of ports by full name.
     """
 
     lines: tuple[_Line, ...]
@@ -110,15 +110,16 @@ def draw(
     columns: int,
     lit: Mapping[str, str] | None = None,
 ) -> Picture:
-    """Draw a system.
+    """Draw a system as text for a terminal.
 
     Args:
         boxes: components of the system.
-        edges: connectors of the system. An end that belongs to no box gets a box of its own.
-        columns: width of the screen in cells. A picture that would be wider has a single column of
-            boxes.
-        lit: styles of highlighted boxes and ports, by name. Wires get the styles of their
-        highlighted ports.
+        edges: connectors of the system. If the component of a port is not in `boxes`, it gets an
+            additional box.
+        columns: width of the screen in cells. If the drawing would be wider, all boxes are in one
+            column.
+        lit: styles of highlighted boxes and ports, by name. The line of a connector has the style
+            of its highlighted port.
     """
     wires = [replace(one, source=_key(one.source), target=_key(one.target)) for one in edges]
     return _fitting(tuple(boxes), tuple(dict.fromkeys(wires)), columns).paint(lit or {})
@@ -147,11 +148,11 @@ def _fitting(boxes: tuple[Box, ...], wires: tuple[Edge, ...], columns: int) -> _
 
 
 def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) -> str:
-    """Return the next box or port in a direction, or the same one if there is no other.
+    """Return the box or port to which an arrow key moves the cursor. It may be the present one.
 
     Args:
-        places: places of a picture.
-        name: name of a box or port.
+        places: positions of the boxes and ports of a picture, by name.
+        name: name of the box or port under the cursor.
         right: step to the right: 1 for right, -1 for left, or 0.
         down: step down: 1 for down, -1 for up, or 0.
     """

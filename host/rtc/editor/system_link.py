@@ -35,15 +35,16 @@ class _Answer:
 
 
 class SystemLink:
-    """A link to a running system. Its own thread reads the state and sends requests.
+    """Link of the editor to a running system, whose thread reads the state and sends the requests.
 
-    The connection is made again if it breaks, because the system may be restarted or replaced.
+    The link connects again if the connection breaks, because the system may be restarted or
+    replaced.
 
     Args:
         socket: control socket of the system.
 
     Attributes:
-        components: the latest descriptions of the components.
+        components: latest descriptions of the components.
         problem: reason why the state is unknown, empty while the system answers.
     """
 
@@ -59,13 +60,13 @@ class SystemLink:
     def request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object
     ) -> None:
-        """Queue a request. `take_answers` returns its result.
+        """Queue a request to the system. `take_answers` returns its result later.
 
         Args:
-            do: verb of the request.
-            then: function that is called in the thread with the answer, and returns the text to
-                show.
-            fields: fields of the request.
+            do: name of the request, such as `activate`.
+            then: function that the link's thread calls with the answer, and that returns the text
+                to show to the user.
+            fields: further fields of the request.
         """
         self._requests.put(partial(self._make, do, fields, then or (lambda answer: "")))
 
@@ -77,9 +78,9 @@ class SystemLink:
         return taken
 
     def turn(self) -> None:
-        """Send all queued requests, and read the state of the system.
+        """Send all queued requests, and read the state of the system once.
 
-        The thread calls this method.
+        The thread of the link calls this method repeatedly.
         """
         while not self._requests.empty():
             if (request := self._requests.get()) is None:

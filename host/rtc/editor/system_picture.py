@@ -16,12 +16,12 @@ from tickrig.host.rtc.system.dot import Box, Edge
 
 
 class SystemPicture(FramedView):
-    """A picture that shows components as boxes and connectors as wires.
+    """Widget of the terminal editor that draws components as boxes and connectors as lines.
 
     Attributes:
         at: full name of the box or port under the cursor, empty if there are no boxes.
-        marked: full name of the port that is to be connected, empty if there is none.
-        picture: picture that is shown.
+        marked: full name of the port that the user marked for a connection, empty if there is none.
+        picture: drawing that is shown at present.
     """
 
     HELP = """

@@ -20,12 +20,12 @@ _T = TypeVar("_T")
 
 
 class CursorRow(NamedTuple, Generic[_T]):
-    """A row of a list: a line of text, and the item that the line represents.
+    """Row of a `CursorView`: a line of text for an item, such as a parameter.
 
     Attributes:
         key: unique key of the item, which does not change while the item exists.
-        line: text of the line.
-        item: the represented item.
+        line: text of the line, with styles.
+        item: item that the row represents.
     """
 
     key: str
@@ -63,14 +63,15 @@ class FramedView(LineView):
 
 
 class CursorView(FramedView, Generic[_T]):
-    """A list of rows with a cursor. The cursor stays on its item while other rows come and go.
+    """Widget that shows a list of rows with a cursor.
 
-    If the row under the cursor is cut off, its end is shown below the rows.
+    The cursor stays on its item while other rows are added or removed. If the row under the cursor
+    is too wide for the widget, its last part is shown below the rows.
 
     Attributes:
-        rows_shown: rows of the view.
-        cursor: number of the row under the cursor.
-        title: title that is shown in the upper border.
+        rows_shown: rows of the list.
+        cursor: index of the row under the cursor.
+        title: title in the upper border.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -84,10 +85,10 @@ class CursorView(FramedView, Generic[_T]):
     ]
 
     class Moved(Message):
-        """A message: another row is under the cursor, or other rows are visible."""
+        """Message of a `CursorView`: another row is under the cursor, or other rows are visible."""
 
     class Entered(Message):
-        """A message: the user chose the row under the cursor.
+        """Message that a `CursorView` sends when the user chooses the row under the cursor.
 
         Attributes:
             view: view that contains the row.
@@ -162,7 +163,10 @@ class CursorView(FramedView, Generic[_T]):
             self.post_message(self.Entered(self))
 
     def on_click(self, event: Click) -> None:
-        """Put the cursor at the mouse. A double click, or a click at the margin, chooses."""
+        """Move the cursor to the clicked row.
+
+        A double click, or a click at the left margin, chooses the row.
+        """
         at = event.get_content_offset(self)
         if at is not None and self.top + at.y < len(self.rows_shown):
             self.put_cursor(self.top + at.y)
@@ -195,11 +199,11 @@ class _PromptScreen(ModalScreen[_T | None]):
 
 
 class QuestionScreen(_PromptScreen[str]):
-    """A screen that asks the user for a line of text. The result is None without an answer.
+    """Dialog that asks the user for a line of text. Its result is None if the user gives no answer.
 
     Args:
         text: text of the question.
-        answer: initial answer.
+        answer: initial text of the answer.
     """
 
     CSS = """
@@ -227,9 +231,11 @@ class QuestionScreen(_PromptScreen[str]):
 
 
 class ChoiceScreen(_PromptScreen[_T]):
-    """A screen that asks the user to choose a row. Only rows with the typed text are shown.
+    """Dialog in which the user chooses a row of a list.
 
-    The result is None without an answer.
+    The list shows only rows with the typed text.
+
+    The result is None if the user chooses no row.
 
     Args:
         text: text of the question.

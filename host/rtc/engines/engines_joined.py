@@ -27,17 +27,17 @@ def engines_joined(
     *,
     fixed: bool = False,
 ) -> Iterator[None]:
-    """Join a system with other systems by engines such as OpenRTM, until the end of the block.
+    """Context manager that connects a system with other systems by OpenRTM or ROS 2 (engines).
 
     Args:
-        options: engines to join, with their settings.
+        options: engines to use, with their settings.
         manager: manager of the system, which is not running yet.
-        attach: function that makes the manager's thread run the calls in a queue.
-        stop: function that ends the command. It is called if a peer requests that.
-        fixed: whether only the command may create and end components, and peers may not.
+        attach: function that makes the manager's thread execute the calls in a queue.
+        stop: function that ends the command. It is called if another process requests the end.
+        fixed: whether other processes must not create or end components of this system.
 
     Raises:
-        Refused: an engine lacks its extra, or does not support the options.
+        Refused: a package that an engine needs is not installed, or the options are not supported.
     """
     with ExitStack() as stack:
         calls = CallQueue()

@@ -36,16 +36,17 @@ class PeerState(StrEnum):
 
 
 class PeerWatch:
-    """A monitor of a peer, from the results of calls. It logs when the peer is lost or returns.
+    """Record of whether the peer of a connector (a port in another process) answers calls.
 
-    One thread records. Any thread may read.
+    The loss of the peer and its return are logged. One thread records the results of calls. Any
+    thread may read the state.
 
     Args:
-        who: name of the connector, for display.
+        who: name of the connector, for the log.
 
     Attributes:
-        state: state of the peer.
-        status: status of the latest call, or CONNECTION_LOST without an answer.
+        state: whether the peer answered the latest call.
+        status: status that the latest call returned, or CONNECTION_LOST if it had no answer.
     """
 
     def __init__(self, who: str) -> None:
@@ -77,15 +78,15 @@ _SEND_LENGTH: Final = "64"
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T, P]):
-    """A codec that converts values of a port to the form used between peers, and back.
+    """Pair of functions that convert values for the transfer to another process, and back.
 
-    The form is bytes, or messages of an engine.
+    The converted form is bytes, or a message of an engine.
 
     Attributes:
-        encode: function that converts a value to this form. It raises ValueError if that is not
+        encode: function that converts a value for the transfer. It raises ValueError if that is not
             possible.
-        decode: function that converts this form to a value. It raises ValueError if it is not a
-            value.
+        decode: function that converts bytes or a message back to a value. It raises ValueError if
+            that is not possible.
     """
 
     encode: Callable[[T], P]
@@ -99,13 +100,13 @@ def cdr(data_type: type[T], endian: Endian = Endian.LITTLE) -> Codec[T, bytes]:
 
 @dataclass(frozen=True, slots=True)
 class PeerEnd:
-    """The settings of a connector on which both peers agree.
+    """Settings of a connector to a port in another process, on which both processes agree.
 
     Attributes:
-        port: name of the peer's port, such as `other/ConsoleOut0.rtc:in`.
+        port: name of the port in the other process, such as `other/ConsoleOut0.rtc:in`.
         connector_id: ID that is unique in this system.
-        properties: properties `dataport.*`, as `ConnectorOptions.parse` takes them. Other
-            properties are kept.
+        properties: properties `dataport.*`, as for `ConnectorOptions.parse`. Other properties are
+            kept.
         name: name of the connector for display. By default, it is the ID.
     """
 
@@ -118,7 +119,7 @@ class PeerEnd:
     def options(self) -> connector.ConnectorOptions:
         """Options of the connector, read from its properties.
 
-        RtcRefused is raised if the options are impossible.
+        RtcRefused is raised if a property has an invalid value.
         """
         lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
         if lengths.isdisjoint(self.properties):
@@ -128,7 +129,7 @@ class PeerEnd:
         return connector.ConnectorOptions.parse(self.properties)
 
     def profile(self, port: DataPort[Any]) -> ConnectorProfile:
-        """Return the profile of the connector with a local port.
+        """Return the profile of the connector between a given local port and the other process.
 
         Raises:
             RtcRefused: the port has a connector with this ID.
@@ -178,7 +179,9 @@ class _ArrivalBuffer(RingBuffer[P]):
         self._lock, self._arrived = threading.Lock(), deque[P](maxlen=options.length)
 
     def arrive(self, value: P) -> tuple[PortStatus, bool]:
-        """Add a value, from any thread, to those that wait for the manager's thread.
+        """Add a value that waits until the manager's thread moves it into the buffer.
+
+        Any thread may call.
 
         Returns:
             The status that `write` would return, and whether no other value was waiting.
@@ -229,14 +232,17 @@ class _SendBuffer(RingBuffer[P]):
         return status
 
     def take(self) -> tuple[P, ...]:
-        """Take the oldest value, or None if there is no value."""
+        """Remove the oldest value. Return it in a tuple, which is empty if there is no value."""
         with self._lock:
             taken = self.pop()
             self._woken = bool(taken)
         return taken
 
     def put_back(self, value: P) -> None:
-        """Put back a value at the front. If the buffer is full, one value is lost."""
+        """Put a value that could not be sent back to the front of the buffer.
+
+        If the buffer is full, one value is lost.
+        """
         with self._lock:
             full = len(self._values) == self._options.length
             self.dropped += full
@@ -256,7 +262,7 @@ class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> _P_co | None:
-        """Take the next value from the peer's port, or return None if the port has no value.
+        """Fetch the next value of the port in the other process, or return None if it has none.
 
         The call may wait up to a time-out. Any exception means that there was no answer.
         """
@@ -290,18 +296,18 @@ class _InPortConnector(connector.Connector[T], Generic[T, P]):
 
 
 class InPortPushConnector(_InPortConnector[T, P]):
-    """A connector that receives the values that a peer puts into an InPort.
+    """Connector of a local InPort into which another process pushes values.
 
     Args:
-        port: local port of the connector.
-        end: settings agreed with the peer.
+        port: local InPort.
+        end: settings on which both processes agree.
         codec: codec that decodes the values.
         calls: queue that runs calls in the manager's thread.
         post: function that schedules a call in that thread before the next tick. By default, each
             value wakes up the thread.
 
     Raises:
-        RtcRefused: the port has a connector with this ID, or the properties are not possible.
+        RtcRefused: the port has a connector with this ID, or a property is invalid.
     """
 
     buffer: _ArrivalBuffer[T]
@@ -318,14 +324,16 @@ class InPortPushConnector(_InPortConnector[T, P]):
         self.buffer, self._post = _ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
-        """Put a value into the buffer, from any thread. It becomes readable before the next tick.
+        """Process a value that another process has pushed.
 
-        This method does not wait for the manager's thread, because that would take twice as long as
-        the call of an ORB itself.
+        The InPort can read it from the next tick on.
+
+        Any thread may call this method. It does not wait for the manager's thread, because that
+        would take twice as long as the call of an ORB itself.
 
         Returns:
             PORT_OK, or another status of the buffer. The result is INVALID_ARGS if the value cannot
-        be decoded, and CONNECTION_LOST after the end of the connector.
+            be decoded, and CONNECTION_LOST after the end of the connector.
         """
         if (value := self._decoded(payload)) is None:
             return PortStatus.INVALID_ARGS
@@ -357,10 +365,7 @@ class _PulledBuffer(RingBuffer[T]):
 
     @property
     def readable(self) -> bool:
-        """Whether `read` finds a new value.
-
-        If not, this property requests a value from the peer.
-        """
+        """Whether `read` finds a new value. If not, a value is requested from the other process."""
         found = len(self._values) > self._skip
         if not found:
             self._request()
@@ -375,21 +380,22 @@ class _PulledBuffer(RingBuffer[T]):
 
 
 class InPortPullConnector(_InPortConnector[T, P]):
-    """A connector that fetches values of a peer's OutPort, in the thread of that peer.
+    """Connector of a local InPort that fetches (pulls) values from an OutPort in another process.
 
-    Reading the InPort, or checking it for new values, does not wait, but requests the next value.
-    One value is fetched at a time. Therefore a value is as old as the previous reading.
+    Reading the InPort, or checking it for new values, does not wait. It only requests the next
+    value, which a separate thread fetches. One value is fetched at a time. Therefore a value is as
+    old as the previous reading.
 
     Args:
-        port: local port of the connector.
-        end: settings agreed with the peer.
+        port: local InPort.
+        end: settings on which both processes agree.
         codec: codec that decodes the values.
-        consumer: consumer that reaches the peer's OutPort.
+        consumer: client for the OutPort in the other process.
         thread: thread that makes the calls.
         calls: queue that runs calls in the manager's thread.
 
     Raises:
-        RtcRefused: the port has a connector with this ID, or the properties are not possible.
+        RtcRefused: the port has a connector with this ID, or a property is invalid.
     """
 
     def __init__(  # noqa: PLR0913, PLR0917 - as many as a connector has parts
@@ -448,7 +454,7 @@ class _InPortConsumer(Protocol[_P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: _P_contra, /) -> PortStatus:
-        """Put a value into the peer's port. Return the status that the peer reports.
+        """Send a value to the port in the other process, and return the status that it reports.
 
         The call may wait up to a time-out. Any exception means that there was no answer.
         """
@@ -456,25 +462,26 @@ class _InPortConsumer(Protocol[_P_contra]):
 
 
 class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
-    """A connector that pushes values from an OutPort to a peer, in the thread of that peer.
+    """Connector of a local OutPort that pushes values to an InPort in another process, in a thread.
 
-    `write` encodes values and buffers them. It does not block. If the peer does not answer, the
-    value is sent again after the thread's `retry_s`. Until then, the policy of the buffer applies.
+    `write` encodes values and buffers them. It does not block. If the other process does not
+    answer, the value is sent again after the thread's `retry_s`. Until then, the policy of the
+    buffer applies.
 
     Args:
-        port: local port of the connector.
-        end: settings agreed with the peer.
+        port: local OutPort.
+        end: settings on which both processes agree.
         codec: codec that encodes the values.
-        consumer: consumer that reaches the peer's InPort.
+        consumer: client for the InPort in the other process.
         thread: thread that makes the calls.
 
     Attributes:
-        buffer: buffer of values for the peer. Its `dropped` counts lost values.
-        sent: number of values that the peer accepted.
-        refused: number of values that the peer refused, for example with a full buffer.
+        buffer: buffer of values that wait to be sent. Its `dropped` counts lost values.
+        sent: number of values that the other process accepted.
+        refused: number of values that the other process refused, for example with a full buffer.
 
     Raises:
-        RtcRefused: the port has a connector with this ID, or the properties are not possible.
+        RtcRefused: the port has a connector with this ID, or a property is invalid.
     """
 
     buffer: _SendBuffer[P]
@@ -500,12 +507,13 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         return self._watch.state
 
     def write(self, value: T) -> PortStatus:
-        """Take a value from the OutPort.
+        """Encode a value that the OutPort writes, and put it into the buffer of values to send.
 
         Returns:
-            INVALID_ARGS if the value cannot be encoded. The status of the buffer, if that is not
-            PORT_OK. Otherwise the peer's status for the latest value sent to it: PORT_OK, an error
-            such as BUFFER_FULL, or CONNECTION_LOST if the peer did not answer.
+            INVALID_ARGS if the value cannot be encoded. Otherwise, the status of the buffer if that
+            is not PORT_OK. Otherwise, the status that the other process returned for the latest
+            value sent to it: PORT_OK, an error such as BUFFER_FULL, or CONNECTION_LOST if it did
+            not answer.
         """
         try:
             payload = self._codec.encode(value)
@@ -533,15 +541,15 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
 
 
 class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
-    """A connector that holds values of an OutPort until a peer takes them.
+    """Connector of a local OutPort that keeps values until another process fetches (pulls) them.
 
     Args:
-        port: local port of the connector.
-        end: settings agreed with the peer.
+        port: local OutPort.
+        end: settings on which both processes agree.
         codec: codec that encodes the values.
 
     Raises:
-        RtcRefused: the port has a connector with this ID, or the properties are not possible.
+        RtcRefused: the port has a connector with this ID, or a property is invalid.
     """
 
     buffer: _LockedBuffer[P]
@@ -560,11 +568,13 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         return self.buffer.write(payload)
 
     def get(self) -> tuple[PortStatus, P | None]:
-        """Take the next value from the buffer, in any thread.
+        """Remove the next value from the buffer and return it, for the other process.
+
+        Any thread may call.
 
         Returns:
-            PORT_OK and the encoded value. If there is no value: BUFFER_EMPTY and None, or
-        CONNECTION_LOST and None after the end of the connector.
+            PORT_OK and the encoded value. If there is no value, BUFFER_EMPTY and None. After the
+            end of the connector, CONNECTION_LOST and None.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

@@ -101,7 +101,10 @@ class Attachment:
 
     @property
     def due_us(self) -> int:
-        """Time at which `tick` has work to do, on the clock of the manager, which may differ."""
+        """Time in us at which `tick` has work to do, on the clock of the manager.
+
+        The clock of the device's link may differ from it.
+        """
         return self.manager.now_us + max(0, self._link_due_us - self.link.now_us)
 
     def tick(self, now_us: int) -> None:
@@ -170,15 +173,17 @@ def attach(  # noqa: PLR0913 - options, by keyword
     context: ExecutionContext | None = None,
     rate_hz: float = _RATE_HZ,
 ) -> RtcLiteProxy:
-    """Add a proxy to a system. The name of the proxy has the lowest free number: `LiteA0`.
+    """Add an RTC-Lite device to a system, by a proxy: a component that represents the device.
+
+    The name of the proxy ends with the lowest free number, such as `LiteA0`. The manager sends the
+    PINGs, removes the proxy of a lost device, and finds the device again.
 
     Args:
-        manager: manager of the system. It sends the PINGs, removes the proxy and finds the device
-            again.
+        manager: manager of the system.
         link: line to the device.
         base_name: name of the proxy without its number.
         settings: settings with time limits, checksum and rediscovery.
-        listener: function that is called with events.
+        listener: function that is called with the events of the proxy.
         context: execution context of the proxy. By default, the proxy gets its own.
         rate_hz: rate of the proxy's own execution context.
 
@@ -205,17 +210,20 @@ _WORD: Final = re.compile(r"([A-Za-z]\w*)=([^,]+?)(?:@(\d{1,8}))?((?:,[^,]*)*)",
 def attach_lite(
     manager: Manager, word: str, stack: ExitStack, boot_us: int, rate_hz: float | None
 ) -> None:
-    """Open a device's line and add its proxy. The proxy returns when the device returns.
+    """Add the RTC-Lite device of an option `--lite` to a system: open its line and add its proxy.
+
+    The proxy is a component that represents the device. If the device disappears and comes back,
+    the proxy is removed and added again.
 
     Args:
         manager: manager of the system.
-        word: word `NAME=URL[@BAUD][,rtno][,boot=TIME]`. The proxy is `NAME0`.
+        word: value of the option, `NAME=URL[@BAUD][,rtno][,boot=TIME]`. The proxy is named `NAME0`.
         stack: exit stack that closes the line.
-        boot_us: pause after the line is opened, unless the word has `boot`.
-        rate_hz: rate of the proxy, or None for 10 Hz.
+        boot_us: pause in us after the line is opened, unless the word has `boot`.
+        rate_hz: rate of the proxy in Hz, or None for 10 Hz.
 
     Raises:
-        Refused: the word or the line is invalid, or no device answers.
+        Refused: the word is invalid, the line cannot be opened, or no device answers.
     """
     name, url, baud, settings = _parse_lite(word, boot_us)
     try:

@@ -19,16 +19,16 @@ _SEQUENCE: Final = range(1, 256)
 
 @dataclass(frozen=True, slots=True)
 class PingStatistics:
-    """Statistics of the PINGs of a proxy.
+    """Statistics of the PINGs with which a proxy checks that its device is present.
 
     Attributes:
         sent: number of PINGs sent.
         answered: number of PINGs that were answered in time.
-        lost: number of PINGs that were not answered in time. The remaining PINGs are still under
-            way.
-        shortest_us: shortest round trip, or 0 without a round trip.
-        longest_us: longest round trip, or 0 without a round trip.
-        total_us: sum of all round trips.
+        lost: number of PINGs that were not answered in time. PINGs that are neither answered nor
+            lost still wait for their answer.
+        shortest_us: shortest round trip in us, or 0 without a round trip.
+        longest_us: longest round trip in us, or 0 without a round trip.
+        total_us: sum of all round trips in us.
     """
 
     sent: int = 0
@@ -101,7 +101,7 @@ class PingMonitor:
 
     @property
     def due_us(self) -> int:
-        """Time at which `tick` has work to do, or `NEVER` for a device that is lost."""
+        """Time in us at which `tick` has work to do, or `NEVER` if the device is lost."""
         if self.lost:
             return NEVER
         return self._pinged_us + self.wait_us if self.awaiting else self._next_us
@@ -126,12 +126,18 @@ class PingMonitor:
         return None if self.lost else self._ping(now_us)
 
     def doubt(self, now_us: int) -> int:
-        """Begin a burst because a reply is missing. Return the number of its first PING."""
+        """Begin a burst of PINGs because a reply is missing.
+
+        Return the number of the first PING to send.
+        """
         self.doubted = True
         return self._ping(now_us)
 
     def let_go(self) -> None:
-        """Stop waiting for a routine PING, because a reply to a request proves the same."""
+        """Stop waiting for the answer to a routine PING, so that a request can be sent.
+
+        The reply to the request will show as well that the device is present.
+        """
         if self.pending:
             self.awaiting = False
             self._count_missed()
@@ -183,15 +189,15 @@ class ProxyEventType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ProxyEvent:
-    """An event of a proxy.
+    """A notable event of a proxy and its device, such as the loss of the device.
 
     Attributes:
-        at_us: time of the event on the clock of the proxy's link.
+        at_us: time of the event in us, on the clock of the proxy's link.
         kind: kind of the event.
         instance_name: name of the proxy.
         reason: reason for the move to Error as text, empty for other events.
         frames: last frames before the event, with their times on the clock of the link.
-        pings: statistics of the proxy's PINGs, or None unless the proxy was removed.
+        pings: statistics of the proxy's PINGs if the proxy was removed, otherwise None.
     """
 
     at_us: int

@@ -27,13 +27,13 @@ from tickrig.wire.rtc_types.rtc import Time
 
 @dataclass(frozen=True, slots=True)
 class DeviceProfile:
-    """The profile that an RTC-Lite device reports.
+    """Description of an RTC-Lite device, as reported by the device: component type and ports.
 
     Attributes:
         type_name: type of the component on the device.
         in_ports: in-ports of the device.
         out_ports: out-ports of the device.
-        context: kind of the execution context that executes the component.
+        context: kind of the execution context that runs the component on the device.
     """
 
     type_name: str
@@ -126,7 +126,7 @@ class _InPortBridge:
         return cls(InPort(name, getattr(rtc, port_type.name)), profile.name, port_type)
 
     def take(self) -> messages.LitePortData | None:
-        """Return the oldest unread value, or None.
+        """Return the oldest unread value of the InPort, encoded for the device, or None.
 
         Raises:
             FieldError: the value is not in the range of its type, or does not fit into a frame.
@@ -159,7 +159,11 @@ class _OutPortBridge:
         return cls(OutPort(name, getattr(rtc, port_type.name)), port_type)
 
     def give(self, data: bytes, now_us: int) -> None:
-        """Write a received value to the OutPort. Raise FieldError if its type does not fit."""
+        """Decode a value received from the device, and write it to the OutPort.
+
+        Raises:
+            FieldError: the data are not a value of the port's type.
+        """
         kind = self.port.data_type
         value = self.port_type.decode(data)
         if kind is rtc.TimedOctetSeq:
@@ -181,10 +185,10 @@ _LOG: Final = log_of(__name__)
 
 
 class PortBridges:
-    """The ports of a proxy, made from the profile of its device.
+    """The ports of a proxy, each of which exchanges values with a port of the device.
 
-    A value that does not fit the device, and data that fit no port, are logged and dropped. Such
-    values do not stop the proxy.
+    The ports are made from the profile of the device. Values that the device cannot receive, and
+    data for an unknown port, are logged and dropped. They do not stop the proxy.
 
     Args:
         ins: in-ports of the device.
@@ -339,7 +343,7 @@ class RtcLiteProxy(RtComponent):
                 context.abort_component(self)
 
     def on_initialize(self) -> ReturnCode:
-        """Bring the device to Inactive, and make a port for each port of the device."""
+        """Read the profile of the device, bring it to Inactive, and make the same ports."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
         self._channel = RequestChannel(self._link, self._settings)
@@ -367,7 +371,10 @@ class RtcLiteProxy(RtComponent):
         return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """If the device has its own timer, set the nearest whole rate in the device."""
+        """Set the new rate, rounded to whole Hz, in a device that executes by its own timer.
+
+        Other devices need no rate, because the proxy triggers each execution.
+        """
         if not self._by_timer:
             return _OK
         rate_hz = min(max(1, round(ec.rate_hz)), _MAX_RATE_HZ)
@@ -403,9 +410,9 @@ class RtcLiteProxy(RtComponent):
         return self._follow()
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Make the device run on_error.
+        """Make the device execute its on_error.
 
-        If a lost reply left the device Active, move it to Error first.
+        If the device is still Active because a reply was lost, move it to Error first.
         """
         self._notify_passive()
         code = self._follow()

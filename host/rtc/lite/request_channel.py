@@ -120,7 +120,7 @@ class _FrameLink:
             _LOG.debug("not sent: %s", error)
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
-        """Wait for bytes. Return the frames that they complete, or None if the line is gone."""
+        """Wait for bytes and return the frames that are complete, or None if the line is gone."""
         try:
             data = self._link.receive(timeout_us)
         except LinkError as error:
@@ -173,7 +173,7 @@ class _RtnoLink(_FrameLink):
             self._made_up.append(LiteFrame(frame.command, bytes([codes.LiteStatus.UNSUPPORTED])))
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
-        """Wait for bytes. Return the frames that they complete, or None if the line is gone."""
+        """Wait for bytes and return the frames that are complete, or None if the line is gone."""
         made_up, self._made_up = self._made_up, []
         frames = super().receive(0 if made_up else timeout_us)
         if frames is None:
@@ -266,10 +266,10 @@ class RequestChannel:
         return min(due_us, self._polled_us + POLL_US) if self.ping_monitor.awaiting else due_us
 
     def tick(self) -> None:
-        """Read the received frames. Send a PING if one is due.
+        """Process the received frames, then send a PING if one is due.
 
-        All received frames are read before a PING is judged overdue. Therefore a late call of this
-        method does not make a device count as lost.
+        All received frames are read before a PING counts as unanswered. Therefore a late call of
+        this method does not make a present device count as lost.
         """
         now_us = self.now_us
         self.poll()
@@ -277,11 +277,10 @@ class RequestChannel:
             self._ping(number)
 
     def request(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
-        """Send a request and wait for its reply.
+        """Send a request to the device and return its reply.
 
-        The result is None without a reply, or if the request may not be sent.
-
-        If a PING is due, the PING is sent first.
+        If a PING is due, it is sent first. The result is None if there is no reply in time, or if
+        the request may not be sent because the device does not answer PINGs.
         """
         if not self._free():
             return None
@@ -295,10 +294,10 @@ class RequestChannel:
         return reply
 
     def request_again(self, command: codes.LiteCommand) -> messages.LiteReply | None:
-        """Send a request until it is answered, at most 4 times. A missing reply has no effect.
+        """Send a request up to 4 times until the device replies, and return the reply or None.
 
-        A fault reply is not an answer, because earlier bytes on the line have corrupted the
-        request.
+        A missing reply does not start a burst of PINGs. A fault reply counts as missing, because it
+        shows that earlier bytes on the line have corrupted the request.
         """
         reply = self._exchange(command)
         for _ in range(RETRIES):

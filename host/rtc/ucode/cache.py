@@ -21,7 +21,7 @@ class SourceStatus(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """The result of a request.
+    """Result of a request that a `Source` has ended.
 
     Attributes:
         address: address that was requested.
@@ -35,17 +35,17 @@ class Fetched:
 
 
 class Source(Protocol):
-    """A non-blocking source of texts by address. Each request ends, at least by a time-out.
+    """Interface of a source that returns the text at an address without blocking its caller.
 
-    In real time, the source is an HTTP client in its own thread. In virtual time, it is a table
-    with a delay.
+    Each request ends with a result, at the latest after a time-out. In real time, the source is an
+    HTTP client with its own thread. In virtual time, it is a table with a delay.
     """
 
     def request(self, address: str, now_us: int) -> None:
         """Request the text at an address."""
 
     def take(self, now_us: int) -> tuple[Fetched, ...]:
-        """Return the requests that have ended."""
+        """Return the results of the requests that have ended since the last call."""
         ...
 
     def close(self) -> None:
@@ -61,15 +61,15 @@ _V = TypeVar("_V")
 
 @dataclass(frozen=True, slots=True)
 class CacheLimits:
-    """The size of a cache, and the life times of its entries.
+    """Settings of a `LookupCache`: its size, and the ages at which its entries expire.
 
     Attributes:
         entries: maximum number of entries. The least recently used entry is removed first.
-        fresh_us: age after which an entry is requested again. Until the answer, the entry remains
-            in use.
-        keep_us: age after which an entry is not used.
-        unknown_us: time before an unknown ucode is requested again.
-        retry_us: time before a failed request is repeated.
+        fresh_us: age in us after which an entry is requested again. It remains in use until the
+            answer arrives.
+        keep_us: age in us after which an entry is no longer used.
+        unknown_us: time in us before an unknown ucode is requested again.
+        retry_us: time in us before a failed request is repeated.
     """
 
     entries: int
@@ -101,7 +101,10 @@ class _CacheCounts:
 
     @property
     def total(self) -> int:
-        """Sum of look-ups and failed requests. If the sum is unchanged, no number has changed."""
+        """Sum of look-ups and failed requests.
+
+        If this sum is the same as before, no count has changed.
+        """
         return self.hits + self.misses + self.failures
 
 
@@ -120,16 +123,18 @@ class _Entry(Generic[_V]):
 
 
 class LookupCache(Generic[_V]):
-    """A cache of values by address. While the source does not answer, old values are used.
+    """Cache of values by address in front of a source.
+
+    It returns old values if the source is not available.
 
     Args:
-        parse: function that makes a value from a text. After a ValueError, the address counts as
-            unknown.
+        parse: function that makes a value from the text at an address. If it raises ValueError, the
+            address counts as unknown.
 
     Attributes:
         counts: numbers of look-ups by result.
         trouble: reason why the latest request failed, empty if it succeeded.
-        invalid: latest text that was not a value, with the reason.
+        invalid: latest text that `parse` rejected, with the reason.
     """
 
     def __init__(self, parse: Callable[[str], _V]) -> None:
@@ -141,9 +146,16 @@ class LookupCache(Generic[_V]):
         return sum(entry.value is not None for entry in self._entries.values())
 
     def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> _V | None:
-        """Return the value at an address, or None if there is none.
+        """Return the cached value at an address, or None if there is none that may be used.
 
-        Request the address if needed.
+        If there is no fresh value, the address is requested from the source. A later call of
+        `update` processes the result.
+
+        Args:
+            address: address to look up.
+            source: source of the texts.
+            limits: settings of the cache.
+            now_us: present time in us.
         """
         entry = self._entries.setdefault(address, _Entry())
         self._entries.move_to_end(address)
@@ -162,7 +174,7 @@ class LookupCache(Generic[_V]):
         return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))
 
     def value(self, address: str) -> _V | None:
-        """Return the value at an address, however old it is.
+        """Return the cached value at an address regardless of its age, or None if there is none.
 
         The call does not count as a look-up.
         """

@@ -22,12 +22,12 @@ _MOST_CHARACTERS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """The information about the place of a ucode marker.
+    """Information that a service has about the place of a ucode marker.
 
     Attributes:
-        x_m: x coordinate of the place.
-        y_m: y coordinate of the place. The y axis points to the left of the x axis.
-        properties: texts `name=value` of the properties, in the order of the names.
+        x_m: x coordinate of the place in m.
+        y_m: y coordinate of the place in m. The y axis points to the left of the x axis.
+        properties: further properties as texts `name=value`, in the order of the names.
     """
 
     x_m: float
@@ -36,7 +36,7 @@ class Contents:
 
 
 class ContentsInterpretation(Lookup[Contents]):
-    """A component that looks up the position and the properties of places.
+    """Component that fetches the information about ucode markers: positions and properties.
 
     The ports are:
 
@@ -44,8 +44,9 @@ class ContentsInterpretation(Lookup[Contents]):
     - `position` out: a point for each ucode, in m
     - `place` out: the ucode, then `name=value` of each property
 
-    The information is a JSON object with the numbers `x_m` and `y_m`. Its other members are
-    properties. The report (Fig. 123) names the component and its cache. The rest is an addition.
+    The information at an address is a JSON object with the numbers `x_m` and `y_m`. Its other
+    members are properties. The report (Fig. 123) names the component and its cache. The rest is an
+    addition.
 
     Args:
         instance_name: name of the component.

@@ -20,15 +20,15 @@ MOST_OCTETS: Final = 8_192
 
 
 class HttpSource:
-    """A client that sends GET requests one after the other in a thread, so that it does not block.
+    """HTTP client that does not block, because its own thread sends the GET requests.
 
-    An answer may take one second and have 8192 octets at most. Only the named hosts get requests,
+    An answer may take `timeout_s` and have 8192 octets at most. Only the named hosts get requests,
     redirections are not followed, and HTTPS is not supported.
 
     Args:
         name: name of the client, for messages.
         hosts: hosts that may get requests.
-        timeout_s: time limit for a whole answer.
+        timeout_s: time limit for a whole answer, in seconds.
     """
 
     def __init__(self, name: str, hosts: tuple[str, ...], timeout_s: float = _TIMEOUT_S) -> None:

@@ -26,13 +26,13 @@ _SILENCE_US: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """The data that an infrared reader sends for one round.
+    """Result of one round of an infrared reader: the ucode markers that it received.
 
     Attributes:
         number: number of the round in the counter of the reader, 0..65535.
-        ucodes: received ucodes, each with the signal level in per cent. The nearest marker is
+        ucodes: received ucodes, each with its signal level in per cent. The nearest marker is
             first.
-        blinded: whether too much light prevented reception.
+        blinded: whether too much light prevented the reception.
     """
 
     number: int
@@ -41,11 +41,12 @@ class Round:
 
 
 class UcodeReaderClient:
-    """A client of an infrared reader, which starts the reader and receives its rounds.
+    """Client for an infrared reader of ucode markers on a serial line.
 
-    A round with a lost or garbled line is left out. After each second without a valid line, the
-    reader is started again. Data that were on the line before the start are dropped, because the
-    robot was at another place then.
+    The client starts the reader and receives the result of each round. A round with a lost or
+    garbled line is dropped. After each second without a valid line, the client starts the reader
+    again. Data that arrived before the start are dropped, because the robot was at another place
+    then.
 
     Args:
         link: line to the reader.
@@ -55,7 +56,7 @@ class UcodeReaderClient:
 
     Attributes:
         garbled: number of invalid lines.
-        incomplete: number of rounds that were left out.
+        incomplete: number of rounds that were dropped.
         restarts: number of times that the reader was started again.
     """
 
@@ -127,12 +128,12 @@ OPEN_SERIAL: Final[_OpenReader] = partial(SerialLink, baud=BAUD)
 
 
 class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
-    """A component that runs an infrared reader while Active, and writes the ucodes of each round.
+    """Component that runs an infrared reader while Active, and writes the ucodes of each round.
 
     The ports are `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was
-    received) and `levels` of their signals in per cent. A reader that does not send is started
-    again each second. If the line is closed, the component goes to Error. The report (Fig. 123) has
-    only the name of the component. Ports and parameters are additions.
+    received) and `levels` (signal level of each ucode in per cent). If the reader sends nothing,
+    the component starts it again each second. If the line is closed, the component moves to Error.
+    The report (Fig. 123) has only the name of the component. Ports and parameters are additions.
 
     Args:
         instance_name: name of the component.

@@ -23,7 +23,13 @@ _LOG: Final = log_of(__name__)
 
 
 class WantedUcode(NamedTuple):
-    """A ucode whose information is wanted, with its address, and the time of its reception."""
+    """A received ucode for which a component looks up information at an address.
+
+    Attributes:
+        ucode: ucode of the marker.
+        address: address at which the information is looked up.
+        received: time at which the ucode was received.
+    """
 
     ucode: str
     address: str

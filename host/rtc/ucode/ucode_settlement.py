@@ -20,12 +20,12 @@ _MOST_CHARACTERS: Final = 1_000
 
 
 class UcodeSettlement(Lookup[str]):
-    """A component that asks a service for the address of the information about each ucode.
+    """Component that asks a service at which address there is information about a ucode.
 
-    The ports are `ucodes` in, and `addresses` out, which alternates a ucode and its address. The
-    service has the address as text under `SERVICE/ucodes/UCODE`. Invalid ucodes are counted in
-    `invalid_ucodes`. The report (Fig. 123) names the component and its cache. The rest is an
-    addition.
+    The ports are `ucodes` in, and `addresses` out. A value of `addresses` alternates ucodes and
+    their addresses. The service has the address as text under `SERVICE/ucodes/UCODE`. Invalid
+    ucodes are counted in `invalid_ucodes`. The report (Fig. 123) names the component and its cache.
+    The rest is an addition.
 
     Args:
         instance_name: name of the component.
@@ -33,7 +33,7 @@ class UcodeSettlement(Lookup[str]):
             client.
 
     Attributes:
-        invalid_ucodes: number of invalid words that arrived.
+        invalid_ucodes: number of invalid ucodes that arrived.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("UcodeSettlement", "Addresses of ucodes, cached")
@@ -61,10 +61,10 @@ class UcodeSettlement(Lookup[str]):
 
 
 def parse_address(text: str) -> str:
-    """Return the address in an answer of the service.
+    """Return the `http://` address that the answer of the ucode service contains.
 
     Raises:
-        ValueError: the text is not an address.
+        ValueError: the text is not such an address.
     """
     address = text.strip()
     if not address.startswith("http://") or len(address) > _MOST_CHARACTERS:

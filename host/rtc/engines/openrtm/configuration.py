@@ -23,12 +23,14 @@ _CONSTRAINTS: Final = "__constraints__"
 
 
 class ConfigurationServant:
-    """The CORBA servant of a component's configuration. Its methods are the operations of the IDL.
+    """CORBA object by which OpenRTM tools read and change the configuration of a component.
 
-    A change is checked as a whole and takes effect in the next period. Two more sets, `__widget__`
-    and `__constraints__`, describe the parameters to editors. These sets cannot be changed.
+    Its methods are the operations of the IDL. A change is checked as a whole and takes effect in
+    the next period. Two more sets, `__widget__` and `__constraints__`, describe the parameters to
+    editors. These sets cannot be changed.
 
-    Not emulated: parameters outside of sets, and services and organizations that peers add.
+    Not emulated: parameters outside of sets, and services and organizations that other processes
+    add.
 
     Args:
         configuration: configuration to serve.

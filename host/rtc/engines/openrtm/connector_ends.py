@@ -57,12 +57,15 @@ def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
 
 
 def completed(properties: _Properties) -> _Properties:
-    """Return properties of a connector. If there are no byte orders, add the default ones."""
+    """Return the properties of a connector, with the default byte orders if they have none."""
     return properties if ENDIAN in texts(properties) else changed(properties, {ENDIAN: _BOTH})
 
 
 def agreed_endian(text: str) -> Endian:
-    """Return the first known byte order of a list, or little endian if the list is empty.
+    """Return the byte order for a connector, which is the first known one of a list.
+
+    Args:
+        text: byte orders, separated by commas. An empty text means little endian.
 
     Raises:
         RtcRefused: no byte order of the list is known.
@@ -90,7 +93,10 @@ def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
 
 
 def offered(port: DataPort[Any]) -> dict[str, str]:
-    """Return the properties that a data port offers to peers. The tool rtcon compares them."""
+    """Return the properties that a data port reports to OpenRTM tools, such as rtcon.
+
+    The tools compare the properties of two ports to find out whether the ports can be connected.
+    """
     subscriptions = "Any" if isinstance(port, InPort) else "flush,new,periodic"
     return {
         "port.port_type": port.port_type,
@@ -106,16 +112,16 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ConnectorPlace:
-    """The objects and names that the local end of a connector needs.
+    """Objects and names that a `ConnectorEnd` needs: ORB, threads, queues and connector names.
 
     Attributes:
-        orb: the ORB of this process.
+        orb: ORB of this process.
         calls: queue that runs calls in the manager's thread.
-        threads: threads that call peers, for all data ports.
+        threads: threads that call other processes, for all data ports.
         post: function that schedules a call in the manager's thread before the next tick.
         connector_id: ID of the connector.
         name: name of the connector, for display.
-        peer: name of the peer's port, for display.
+        peer: name of the port in the other process, for display.
     """
 
     orb: Orb
@@ -132,10 +138,13 @@ class ConnectorPlace:
 
 
 class ConnectorEnd(ABC):
-    """The local end of a connector. It belongs to the manager's thread.
+    """Base class for the local half of a connector to a port in another process.
+
+    Only the manager's thread may use it.
 
     Attributes:
-        thread: thread that calls the peer, one call after the other, or None until it is started.
+        thread: thread that calls the other process, one call after the other, or None until it is
+            started.
     """
 
     def __init__(self, place: ConnectorPlace) -> None:
@@ -145,13 +154,13 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve the object that the peer will call.
+        """Serve the CORBA object that the other process will call, if it makes the calls.
 
         Args:
             values: properties of the connector.
 
         Returns:
-            Properties with which the peer finds the object.
+            Properties that tell the other process where the object is.
 
         Raises:
             RtcRefused: the properties are invalid.
@@ -159,12 +168,12 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Store the object of the peer that this end will call, and join the connector.
+        """Connect the local port with the object of the other process, and return the connector.
 
-        This method does not call the peer.
+        This method does not call the other process.
 
         Args:
-            values: properties of the connector, including those of the peer.
+            values: properties of the connector, including those from the other process.
 
         Raises:
             RtcRefused: the properties are invalid.
@@ -188,10 +197,14 @@ class ConnectorEnd(ABC):
         return self._place.orb.text(self._served[-1])
 
     def reference(self, ior: str, kind: Any) -> Reference:
-        """Return the reference in an IOR, narrowed to an interface.
+        """Return the CORBA reference that an IOR contains, as a reference to a given interface.
 
-        No request asks the peer whether it has this interface. The IOR names the interface. If the
-        IOR is wrong, the first call ends with an error.
+        The other process is not asked whether its object has this interface. If it has another one,
+        the first call ends with an error.
+
+        Args:
+            ior: text of the IOR (interoperable object reference).
+            kind: stub class of the interface.
 
         Raises:
             RtcRefused: the text is not a reference.
@@ -216,7 +229,7 @@ _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
 
 
 class NoAnswerError(Exception):
-    """A call had no answer: the peer does not run, hangs, or no longer has the object."""
+    """A CORBA call had no answer: the process does not run or hangs, or the object has ended."""
 
 
 class _Complaints:
@@ -241,11 +254,11 @@ class _Complaints:
 
 
 class InPortClient:
-    """A client that puts values into the InPort of a peer (OpenRTM-aist, InPortCorbaCdrConsumer).
+    """Client that writes to an InPort in another process (OpenRTM-aist, InPortCorbaCdrConsumer).
 
     Args:
-        reference: reference of an InPortCdr.
-        peer: name of the peer's port, for display.
+        reference: CORBA reference of the port's object InPortCdr.
+        peer: name of that port, for display.
     """
 
     def __init__(self, reference: Reference, peer: str) -> None:
@@ -276,9 +289,9 @@ class _OutPortClient:
         self._complaints = _Complaints(peer)
 
     def get(self) -> bytes | None:
-        """Get a value, or None if there is none.
+        """Return the next value of the port in the other process, or None if it has none.
 
-        Raise NoAnswerError if the peer does not answer.
+        Raise NoAnswerError if the other process does not answer.
         """
         try:
             status, payload = self._get()
@@ -296,7 +309,7 @@ class _OutPortClient:
 
 
 class InPortAnswers:
-    """The operations of InPortCdr, which put the values of a peer into a local InPort."""
+    """CORBA operations of InPortCdr, by which another process writes values to a local InPort."""
 
     def __init__(self, connector: peer_ports.InPortPushConnector[Any, bytes]) -> None:
         self._put, self._theirs = connector.put, _theirs()
@@ -336,14 +349,14 @@ _OUTPORT_IOR: Final = "dataport.corba_cdr.outport_ior"
 
 
 class DataEnd(ConnectorEnd):
-    """The local end of a data connector.
+    """The local half of a connector between a local data port and a data port in another process.
 
-    If the peer makes the calls, this end publishes an object. It is then an InPort into which the
-    peer pushes, or an OutPort from which the peer pulls. If this end makes the calls, it
-    subscribes.
+    If the other process makes the calls, this class serves an object to it: an InPort into which
+    the other process pushes values, or an OutPort from which it pulls them. Otherwise, this class
+    calls the object of the other process.
 
     Args:
-        place: environment of the connector.
+        place: ORB, threads, queues and names that the connector needs.
         port: local port of the connector.
     """
 
@@ -399,15 +412,16 @@ _OPERATIONS: Final[Mapping[str, tuple[str, ...]]] = {"RefHard": ("Go", "Stop")}
 
 
 class ServiceEnd(ConnectorEnd):
-    """The local end of a connector of service ports.
+    """The local half of a connector between a local service port and one in another process.
 
-    A call from a peer is executed in the manager's thread. A call to a peer returns at once and is
-    made in the thread of the peer. A call without an answer is logged and not repeated.
+    A call from the other process is executed in the manager's thread. A call to the other process
+    returns at once, because another thread makes it. A call without an answer is logged and not
+    repeated.
 
     Not emulated: interfaces whose operations have arguments or results.
 
     Args:
-        place: environment of the connector.
+        place: ORB, threads, queues and names that the connector needs.
         port: local port of the connector.
     """
 
@@ -416,7 +430,11 @@ class ServiceEnd(ConnectorEnd):
         self._port = port
 
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve the interfaces of the local port under the names for OpenRTM 1.0 and later."""
+        """Serve the interfaces that the local port provides. Return properties with their references.
+
+        Each interface has two properties, with its name for OpenRTM 1.0 and its name for later
+        versions.
+        """
         found: dict[str, str] = {}
         for provider in self._port.providers:
             if (operations := _OPERATIONS.get(provider.profile.type_name)) is not None:
@@ -428,9 +446,9 @@ class ServiceEnd(ConnectorEnd):
         return found
 
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Join a port that represents the peer's port.
+        """Connect the local port with a port that represents the port in the other process.
 
-        That port provides the services that the peer published, and makes the calls to the peer.
+        That port provides the services of the other process, and passes each call on to it.
         """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:

@@ -30,7 +30,7 @@ class _Entry:
 
 
 class ServantReferences:
-    """A table of the components and execution contexts that peers can call, with references.
+    """Table of the components and execution contexts that other processes can call by CORBA.
 
     Entries are added and removed in the manager's thread. Any thread may look them up.
 
@@ -38,8 +38,8 @@ class ServantReferences:
         orb: ORB that serves the objects.
         stubs: stubs of Tickrig's IDL.
         calls: queue that runs calls in the manager's thread.
-        fixed: whether only this process creates and ends components. Peers cannot do so, and cannot
-            move a component to another execution context.
+        fixed: whether other processes are not allowed to create and end components, and to move a
+            component to another execution context.
     """
 
     def __init__(self, orb: Orb, stubs: Stubs, calls: CallQueue, *, fixed: bool = False) -> None:
@@ -103,12 +103,13 @@ def _calling(name: str) -> Callable[[AttachedContexts, int], Any]:
 
 
 class AttachedContexts:
-    """The IDL operations on the execution contexts of a component, local ones and those of peers.
+    """CORBA operations of a component on its execution contexts, local and foreign ones.
 
-    A peer attaches an execution context of its own, and then calls `on_activated`, `on_execute` and
-    so on with the handle that it received. The callback gets this context with the time of the
-    manager. The peer manages its rate and states. For local contexts, calls of callbacks by peers
-    return PRECONDITION_NOT_MET.
+    Another process attaches its own execution context to the component, and gets a handle. It then
+    calls `on_activated`, `on_execute` and so on with that handle. The callback gets the foreign
+    context as its argument, with the time of the manager. The other process manages the rate and
+    the states. If such a call has the handle of a local context, the result is
+    PRECONDITION_NOT_MET.
 
     Args:
         component: component that owns the contexts.
@@ -138,7 +139,10 @@ class AttachedContexts:
         return self._calls.call(lambda: self._by_handle().get(exec_handle))
 
     def get_context_handle(self, cxt: Reference) -> int:
-        """Return the handle of a context, or -1 if the component does not take part in it."""
+        """Return the handle (number) by which CORBA calls identify an execution context.
+
+        The result is -1 if the component does not take part in the context.
+        """
         return self._calls.call(lambda: self._handle(cxt))
 
     def is_alive(self, exec_context: Reference) -> bool:
@@ -148,7 +152,12 @@ class AttachedContexts:
         )
 
     def attach_context(self, exec_context: Reference) -> int:
-        """Take part in a context of a peer. Return the handle of the context, or -1 for nil."""
+        """Add the component to the execution context of another process.
+
+        Return the handle of the context.
+
+        The result is -1 for a nil reference.
+        """
         return self._calls.call(lambda: self._attach(exec_context))
 
     def detach_context(self, exec_handle: int) -> Any:
@@ -280,10 +289,11 @@ INTERFACE = "RTC.ExecutionContextService"
 
 
 class ExecutionContextServant:
-    """The CORBA servant of an execution context. Its methods are the operations of the IDL.
+    """CORBA object by which other processes control an execution context and its components.
 
-    Activating, deactivating and resetting wait for the new state up to 1 s, as in OpenRTM.
-    Components of other processes cannot join the context. Such requests return UNSUPPORTED.
+    Its methods are the operations of the IDL. Activating, deactivating and resetting wait for the
+    new state up to 1 s, as in OpenRTM. Components of other processes cannot join the context. Such
+    requests return UNSUPPORTED.
 
     Args:
         context: execution context to serve.

@@ -30,15 +30,14 @@ _RATE: Final = "exec_cxt.periodic.rate"
 
 
 class ManagerServant:
-    """The CORBA servant of a manager. Its methods are the operations of the IDL.
+    """CORBA object by which OpenRTM tools create and delete components, and end the process.
 
-    The servant creates and deletes components of the types that its process knows, and ends the
-    process. Operations on modules, other managers and settings are not supported. Such operations
-    return UNSUPPORTED or empty lists.
+    Its methods are the operations of the IDL. Operations on modules, other managers and settings
+    are not supported. They return UNSUPPORTED or empty lists.
 
     Args:
         manager: manager to serve.
-        references: references of components.
+        references: references of the components.
         stop: function that ends the process.
     """
 

@@ -25,16 +25,17 @@ _LOG: Final = log_of(__name__)
 
 
 class NameServer:
-    """A client that keeps names bound in a name server. It waits for the server in its own thread.
+    """Client that registers components in a CORBA name server, and keeps them registered.
 
-    All names are bound again every 10 s, and also as soon as a name server answers again after it
-    did not answer. Both events are logged.
+    Its thread makes the calls, so that no other thread waits for the name server. All names are
+    registered again every 10 s, and also as soon as the name server answers again after a failure.
+    The failure and its end are logged.
 
     Args:
-        orb: the ORB of this process.
+        orb: ORB of this process.
         address: address of the name server.
-        renew_us: interval at which all names are bound.
-        look_us: retry interval while the name server does not answer.
+        renew_us: interval in us at which all names are registered again.
+        look_us: retry interval in us while the name server does not answer.
 
     Attributes:
         answers: whether the name server accepted the names at the last attempt.
@@ -52,11 +53,13 @@ class NameServer:
         self._thread.submit(self._look)
 
     def bind(self, path: str, reference: Reference) -> None:
-        """Bind a name to an object and keep it bound. Another object with this name loses the name.
+        """Register a name for an object in the name server, and keep it registered.
+
+        If another object has this name, the name then refers to the new object.
 
         Args:
             path: path of the name, such as `robot.host_cxt/ConsoleIn0.rtc`.
-            reference: reference of the object.
+            reference: CORBA reference of the object.
         """
         with self._lock:
             self._bound[path] = reference
@@ -170,7 +173,10 @@ def _make_contexts(root: Any, name: list[Any]) -> None:
 
 
 def name_of(path: str) -> list[Any]:
-    """Convert a path to a CORBA name. In each part, the text after the last dot is the kind."""
+    """Convert a path to a CORBA name, which has an ID and a kind for each part of the path.
+
+    In each part, the kind is the text after the last dot.
+    """
     parts = (part.rpartition(".") for part in path.split("/"))
     return [
         CosNaming.NameComponent(*((id_, kind) if dot else (kind, ""))) for id_, dot, kind in parts

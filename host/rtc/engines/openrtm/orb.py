@@ -54,9 +54,10 @@ class _OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
 
 
 class Orb:
-    """The ORB of this process. A process can have one ORB of omniORB, and another after closing it.
+    """The CORBA ORB of this process, which serves local objects and makes calls to other processes.
 
-    A call to a peer that does not answer ends after 1 s with `CORBA.TRANSIENT`.
+    A process can have only one ORB of omniORB at a time. A call without an answer ends after 1 s
+    with `CORBA.TRANSIENT`.
 
     Args:
         endpoint: address at which the ORB listens.
@@ -82,15 +83,15 @@ class Orb:
             raise _OrbFailed(f"cannot listen at {endpoint}: no address or free port here") from None
 
     def serve(self, skeleton: type, *answers: object) -> Reference:
-        """Make an object callable by peers.
+        """Make a local object callable by other processes, and return its CORBA reference.
 
         Args:
             skeleton: skeleton class of the object's interface, from a `..__POA` module.
-            answers: objects with a method per operation, named as in the IDL. The first object that
-                has the method is used, and a missing operation is NO_IMPLEMENT. The methods are
-                called in threads of the ORB. Exceptions become answers: TimeoutError is TIMEOUT,
-                RtcRefused is BAD_PARAM or similar, a CORBA exception is passed on, and any other is
-                INTERNAL, with a line in the log.
+            answers: objects whose methods execute the operations, named as in the IDL. The first
+                object that has the method is used, and a missing operation is NO_IMPLEMENT. The
+                methods are called in threads of the ORB. Exceptions become answers: TimeoutError is
+                TIMEOUT, RtcRefused is BAD_PARAM or similar, a CORBA exception is returned as it is,
+                and any other is INTERNAL, with a line in the log.
 
         Returns:
             The reference of the object. Calls through this reference within this process use no
@@ -107,7 +108,7 @@ class Orb:
         return poa.id_to_reference(name.encode())
 
     def key(self, reference: Reference) -> bytes:
-        """Return a key that identifies a served object, or an empty key for other objects."""
+        """Return a key that identifies an object of this ORB, or an empty key for a foreign one."""
         try:
             found: bytes = self._poa.reference_to_id(reference)
         except (PortableServer.POA.WrongAdapter, CORBA.SystemException):
@@ -119,10 +120,13 @@ class Orb:
         self._poa.deactivate_object(self._poa.reference_to_id(reference))
 
     def reference(self, text: str) -> Reference:
-        """Return the reference for an IOR or a corbaloc, without sending a request.
+        """Return the CORBA reference that a text describes, without a request to the object.
+
+        Args:
+            text: IOR, or corbaloc URL such as `corbaloc::localhost:2809/NameService`.
 
         Raises:
-            ValueError: the text is neither an IOR nor a corbaloc.
+            ValueError: the text is neither an IOR nor a corbaloc URL.
         """
         try:
             return self._orb.string_to_object(text)
@@ -135,10 +139,10 @@ class Orb:
         return ior
 
     def close(self) -> None:
-        """Answer the running calls, refuse all other calls, and free the port.
+        """Shut the ORB down: answer the running calls, refuse other calls, and free the port.
 
-        If a peer closes the connection instead of answering, omniORB repeats the call, and such a
-        call may not end. In this case, the ORB is not closed, and a line is logged.
+        If another process closes the connection instead of answering, omniORB repeats the call, and
+        such a call may not end. In this case, the ORB stays open, and a line is logged.
         """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)
@@ -166,10 +170,11 @@ def _serves() -> bool:
 
 
 def nvlist(values: Mapping[str, str]) -> list[Any]:
-    """Return an NVList of strings.
+    """Return properties as an NVList, the list of names and values that CORBA operations use.
 
-    Characters that a CORBA string cannot carry become U+FFFD, and a line is logged. Otherwise, the
-    ORB would refuse the whole answer after the servant returned, where nothing can be logged.
+    Characters that a CORBA string cannot contain are replaced by U+FFFD, and the text is logged.
+    Otherwise, the ORB would refuse the whole answer after the servant has returned, where the
+    reason cannot be logged.
     """
     name_value = stubs().sdo.NameValue
     return [
@@ -179,7 +184,14 @@ def nvlist(values: Mapping[str, str]) -> list[Any]:
 
 
 def carried(name: str, text: str) -> str:
-    """Replace the characters that a CORBA string cannot carry. If there are any, log the text."""
+    """Return a text in which characters that a CORBA string cannot contain are replaced by U+FFFD.
+
+    If there are such characters, the text is logged.
+
+    Args:
+        name: name of the property, for the log.
+        text: text to send.
+    """
     sent = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
     if sent != text:
         _LOG.warning(

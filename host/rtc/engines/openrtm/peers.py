@@ -34,19 +34,19 @@ _USUAL: Final = {
 
 
 class Peers:
-    """A monitor that makes and renews connectors to components of other processes.
+    """Makes the connectors of a system to components in other processes, and renews lost ones.
 
     Each connector is checked once a second, in its own thread. A connector that could not be made,
-    or whose peer restarted, is made again. A connector that was ended while the peer ran is not
-    made again.
+    or whose other process restarted, is made again. A connector that was ended while the other
+    process ran is not made again.
 
     Args:
         ports: ports of the system.
         manager: manager of the system. Its `remotes` list the wanted connectors.
-        look_us: interval at which each connector is checked.
+        look_us: interval in us at which each connector is checked.
 
     Raises:
-        RtcRefused: a path does not name a port.
+        RtcRefused: the path of a remote component is invalid.
     """
 
     def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = _LOOK_US) -> None:

@@ -85,7 +85,9 @@ class _PeerConnections:
     def reserve(
         self, profile: _Profile, values: dict[str, str], peer_name: str
     ) -> _PeerConnection | None:
-        """Check a new connector, and serve the object that the peer will call.
+        """Begin a new connector: check it, and serve the object that the other process will call.
+
+        `keep` completes the connector later, or `drop` removes it again.
 
         Args:
             profile: profile of the connector.
@@ -93,8 +95,8 @@ class _PeerConnections:
             peer_name: name of the other port, for display.
 
         Returns:
-            The connection that must still be joined, or None if both ports are local, because local
-            ports are joined at once.
+            The connection for `keep` or `drop`, or None if both ports are local, because local
+            ports are connected at once.
 
         Raises:
             RtcRefused: the connector cannot be made.
@@ -122,15 +124,15 @@ class _PeerConnections:
         return connection
 
     def keep(self, connection: _PeerConnection, profile: _Profile, values: dict[str, str]) -> None:
-        """Complete a reserved connector.
+        """Complete a connector that `reserve` began: connect the local port with the other process.
 
         Args:
-            connection: the result of `reserve`.
-            profile: profile that the peer returned.
+            connection: result of `reserve`.
+            profile: profile that the other process returned.
             values: properties of the connector.
 
         Raises:
-            RtcRefused: the connector is impossible, or the port no longer exists.
+            RtcRefused: the connector is not possible, or the local port has ended.
         """
         if self._closed or self._by_id.get(connection.connector_id) is not connection:
             message = f"{self._port.full_name} has ended"
@@ -152,11 +154,13 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connection to a peer by its ID, or None, and whether the ID is known.
+        """Return the connection with an ID, and record that its peer need not be notified of the end.
 
-        The ID is known if the connector exists, or has just ended.
+        This is called when the peer or a tool requests the end of the connector.
 
-        After this call, the peer of the connector need not be notified of the end.
+        Returns:
+            The connection, or None, and whether the ID is known. The ID is known if the connector
+            exists, or has just ended.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -274,7 +278,11 @@ class _PortAnswers:
         return stubs().rtc.ConnectorProfile("", "", [], [])
 
     def connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Connect the ports of a connector. A missing ID and missing byte orders are filled in."""
+        """Connect the ports that a connector profile lists. Return the result and the new profile.
+
+        A missing ID and missing byte orders are filled in. The first port of the list then
+        connects.
+        """
         profile.connector_id = profile.connector_id or str(uuid.uuid4())
         profile.properties = connector_ends.completed(profile.properties)
         if not profile.ports or profile.ports[0] is None:
@@ -288,7 +296,7 @@ class _PortAnswers:
         return answer
 
     def notify_connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Join the local port to a connector, and make the next port do the same."""
+        """Connect the local port as a profile describes, and request the same from the next port."""
         code, values = _OK, connector_ends.texts(profile.properties)
         try:
             name = _peer_name(profile, self._port.full_name)
@@ -321,7 +329,7 @@ class _PortAnswers:
         return next((code for code in codes if code != _code(_OK)), _code(_OK))
 
     def notify_disconnect(self, connector_id: str) -> Any:
-        """End a connector of the local port, and make the next port do the same."""
+        """End a connector of the local port, and request the same from the next port."""
         connection, known = self._calls.call(partial(self._connections.look, connector_id))
         if not known:
             return _code(ReturnCode.BAD_PARAMETER)
@@ -397,21 +405,21 @@ _POLL_US: Final = 10_000
 
 
 class SystemPorts:
-    """All ports of a system that peers can connect.
+    """All ports of a system that other processes can connect by OpenRTM.
 
     Args:
-        orb: the ORB of this process.
+        orb: ORB of this process.
         calls: queue that runs calls in the manager's thread.
         manager: manager of the system.
 
     Attributes:
         orb: ORB of this process.
         calls: queue that runs calls in the manager's thread.
-        references: PortService of each port.
-        ending: connectors that have ended by ID, until their peers are notified.
+        references: CORBA references of the ports.
+        ending: connectors that have ended, by ID, until the other process is notified.
         components: components that are served.
-        arrivals: values from peers, until the next tick.
-        threads: threads that call peers, for all data ports.
+        arrivals: values from other processes that wait for the next tick.
+        threads: threads that call other processes, for all data ports.
     """
 
     def __init__(self, orb: Orb, calls: CallQueue, manager: Manager) -> None:
@@ -424,7 +432,7 @@ class SystemPorts:
         self._by_key: dict[bytes, AnyPort] = {}
 
     def find(self, reference: Reference) -> AnyPort | None:
-        """Return the local port of a reference, or None if it belongs to a peer."""
+        """Return the local port of a CORBA reference, or None for a port in another process."""
         return self._by_key.get(self.orb.key(reference))
 
     def enter(self, port: AnyPort, reference: Reference) -> None:
@@ -449,7 +457,10 @@ class SystemPorts:
         self._manager.connect(ports[0].full_name, ports[1].full_name, values, **names)
 
     def describe(self, connector: ConnectorBase) -> _Profile | None:
-        """Return the profile of a connector of two local ports, if peers know both, else None."""
+        """Return the CORBA profile of a connector between two local ports.
+
+        The result is None if other processes cannot call one of the ports.
+        """
         references = [self.references.get(port) for port in connector.ports]
         if len(references) != 2 or None in references:
             return None
@@ -476,12 +487,12 @@ class SystemPorts:
 
 
 class ComponentPorts:
-    """The ports of one component, which peers can connect while the component lives.
+    """The ports of one component, which other processes can connect until the component ends.
 
     Args:
         system: all ports of the system.
-        component: the local component.
-        owner: RTObject of the component.
+        component: local component.
+        owner: CORBA reference of the component.
     """
 
     def __init__(self, system: SystemPorts, component: RtComponent, owner: Reference) -> None:

@@ -16,19 +16,19 @@ INTERFACE: Final = "OpenRTM.DataFlowComponent"
 
 
 class RtObjectServant:
-    """The CORBA servant of a component. Its methods are the operations of the IDL.
+    """CORBA object by which other processes use a component: its ports, states and configuration.
 
-    Not emulated: organizations and composite components, whose lists are empty, and services that
-    peers add.
+    Its methods are the operations of the IDL. Not emulated: organizations and composite components,
+    whose lists are empty, and services that other processes add.
 
     Args:
         component: component to serve.
         manager: manager of the component.
-        references: references of components.
+        references: references of the components.
 
     Attributes:
         ports: ports of the component, once they are served.
-        configuration: reference of the component's configuration.
+        configuration: CORBA reference of the component's configuration.
     """
 
     def __init__(

@@ -33,7 +33,7 @@ _MODULES: Final = ("SDOPackage", "RTC", "OpenRTM", "RTM", "_GlobalIDL")
 
 
 class Stubs:
-    """The modules of Tickrig's IDL in omniORB's Python mapping.
+    """The Python modules that omniORB generates from Tickrig's IDL files.
 
     The names in these modules are known only at run time, so their type is `Any`.
 
@@ -45,7 +45,7 @@ class Stubs:
         rtc: IDL module `RTC`.
         openrtm: IDL module `OpenRTM`, with the component and data ports.
         rtm: IDL module `RTM`, with the manager.
-        services: definitions outside of IDL modules, which is `RefHard`.
+        services: interface `RefHard`, which is in no IDL module.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:
@@ -55,11 +55,11 @@ class Stubs:
         )
 
     def skeleton(self, interface: str) -> type:
-        """Return the skeleton class of an interface, for `Orb.serve`.
+        """Return the skeleton class of a CORBA interface, from which `Orb.serve` makes an object.
 
         Args:
-            interface: name of the interface, such as `RTC.PortService`, or `RefHard`, which is in
-                no module.
+            interface: name of the interface with its module, such as `RTC.PortService`. `RefHard`
+                is in no module.
         """
         module, _, name = interface.rpartition(".")
         found: type = getattr(self._modules[f"{module or '_GlobalIDL'}__POA"], name)
@@ -68,7 +68,9 @@ class Stubs:
 
 @cache
 def stubs() -> Stubs:
-    """Import the stubs of Tickrig's IDL. On a machine's first import they are compiled, in 0.5 s.
+    """Return the Python modules that omniORB generates from Tickrig's IDL files.
+
+    At the first use on a machine, the IDL files are compiled, which takes 0.5 s.
 
     Raises:
         RtcRefused: omniORB is not installed, or the stubs cannot be made.
@@ -88,12 +90,12 @@ def stubs() -> Stubs:
 
 
 def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) -> None:
-    """Write stubs into a folder.
+    """Compile IDL files to Python modules in a folder, by omniidl.
 
     Args:
         files: IDL files. The files that they include are in the folder of Tickrig's IDL.
         folder: folder for the package.
-        package: package that contains the modules.
+        package: name of the package that contains the modules.
 
     Raises:
         RtcRefused: omniidl is not installed, or reports an error.

@@ -110,12 +110,14 @@ _LOG: Final = log_of(__name__)
 
 @contextmanager
 def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
-    """Connect the ports of a system with ROS 2 topics, including ports of components added later.
+    """Context manager that connects the ports of a system with ROS 2 topics.
+
+    Ports of components that are added later are connected too.
 
     Raises:
-        OSError: the table cannot be read.
-        ValueError: the table, the domain or the interface is invalid, or the table does not fit the
-            present components.
+        OSError: the table of ports and topics cannot be read.
+        ValueError: the table, the DDS domain or the network interface is invalid, or the table does
+            not fit the present components.
     """
     table = _read_table(options)
     _refuse_mistakes(table, manager)

@@ -25,14 +25,16 @@ _ASTRAY_NS: Final = 10_000_000_000
 
 
 class Stamps:
-    """A converter between times of a system and time stamps of ROS messages.
+    """Converts times of a system to time stamps of ROS messages, and back.
+
+    The times count from the start of the system, the stamps from 1970.
 
     Values with equal times get equal stamps, for example a pose and its transform. A value whose
     time differs by more than 1 s from the time of the system gets the current time. If a system is
     late, its values have the times at which they were due.
 
     Args:
-        now_us: function that returns the time of the system.
+        now_us: function that returns the time of the system in us.
         clock: function that returns nanoseconds since 1970.
     """
 
@@ -54,9 +56,9 @@ class Stamps:
         return divmod(self._start_ns + 1_000 * tm_us, 1_000_000_000)
 
     def to_system(self, sec: int = 0, nanosec: int = 0) -> Time:
-        """Convert a message's time stamp to a time of the system.
+        """Convert the time stamp of a ROS message to a time of the system.
 
-        Without a stamp, use the present time.
+        Without a stamp, the result is the present time.
         """
         now_us = self._now_us()
         at_us = (sec * 1_000_000_000 + nanosec - self._start_ns) // 1_000
@@ -79,7 +81,9 @@ _FIELD: Final = re.compile(r"([\w/]+)(?:(\[)(\d*)\])? (\w+)")
 
 @cache
 def message_type(name: str) -> Any:
-    """Return the class of a message, with its fields in the order of the message definition.
+    """Return the Python class of a ROS 2 message, for Cyclone DDS.
+
+    Its fields have the order of the message definition.
 
     Args:
         name: name of the message, such as `geometry_msgs/msg/Twist`.
@@ -94,7 +98,7 @@ def message_type(name: str) -> Any:
 
 
 def dds_name(name: str) -> str:
-    """Return the DDS name of a message (ROS 2, "Topic and Service name mapping to DDS").
+    """Return the DDS type name of a ROS message (ROS 2, "Topic and Service name mapping to DDS").
 
     >>> dds_name("std_msgs/msg/Bool")
     'std_msgs::msg::dds_::Bool_'
@@ -104,7 +108,7 @@ def dds_name(name: str) -> str:
 
 
 def ros_name(name: str) -> str:
-    """Return the ROS name for the DDS name of a message. Other names are returned unchanged.
+    """Return the name of a ROS message from its DDS type name. Other names are returned unchanged.
 
     >>> ros_name("std_msgs::msg::dds_::Bool_"), ros_name("HelloWorld")
     ('std_msgs/msg/Bool', 'HelloWorld')

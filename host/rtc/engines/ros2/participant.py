@@ -112,14 +112,14 @@ _PEERS: Final = (
 
 
 class DdsParticipant:
-    """A participant in a DDS domain, which makes the writers and readers of topics.
+    """Participant in a DDS domain, by which the engine reads and writes ROS 2 topics.
 
     Args:
-        domain: number of the domain, 0..232.
-        interface: network interface of the machine, such as eth0, or loopback if it is empty.
+        domain: number of the DDS domain, 0..232.
+        interface: network interface of the machine, such as eth0. If it is empty, loopback is used.
 
     Raises:
-        ValueError: the interface does not exist, or cannot be used.
+        ValueError: the network interface does not exist, or cannot be used.
     """
 
     def __init__(self, domain: int, interface: str = "") -> None:
@@ -181,7 +181,7 @@ def _qos_of(entry: TopicEntry) -> Qos:
 
 
 def reason_of(error: DDSException) -> str:
-    """Return the reason of a DDS error as text, without names from the code of DDS."""
+    """Return the reason of a DDS exception as text, without names from the code of DDS."""
     return str(error).partition("]")[2].strip() or str(error)
 
 
@@ -210,10 +210,10 @@ _UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
 
 
 class OwnEndpoint(Protocol):
-    """A writer or reader of a local topic.
+    """Interface of a topic writer or reader in this process.
 
     Attributes:
-        entry: port and topic of the endpoint.
+        entry: port and topic that the endpoint connects.
     """
 
     @property
@@ -231,12 +231,12 @@ _Endpoints = Mapping[str, OwnEndpoint]
 
 
 class ForeignEndpoints:
-    """A log of peers whose writers or readers do not fit a local topic, with the reasons.
+    """Logs which writers or readers of other processes do not fit a local topic, and why.
 
     Args:
-        participant: participant in the domain.
-        writing: topics that are written here, which may change.
-        reading: topics that are read here.
+        participant: participant in the DDS domain.
+        writing: endpoints that write topics in this process, which may change.
+        reading: endpoints that read topics in this process, which may change.
     """
 
     def __init__(

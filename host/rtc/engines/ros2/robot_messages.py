@@ -22,9 +22,9 @@ _STRAIGHT: Final = 1e-9
 
 
 def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that converts a pose to an Odometry message.
+    """Return a function that converts a pose in the plane to an Odometry message.
 
-    The velocity in the message is the velocity since the previous pose.
+    The velocity in the message is calculated from the previous pose.
     """
     make, speed = _odometry(entry, stamps), _Speed()
     return lambda value: make(value.tm, value.data, speed.since(value.tm, value.data))
@@ -57,7 +57,10 @@ def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def pose_in(data_type: Any, entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that converts a PoseStamped to a pose in the plane, without the tilt."""
+    """Return a function that converts a PoseStamped message to a pose in the plane.
+
+    The tilt is dropped.
+    """
 
     def convert(message: Any) -> Any:
         stamp, pose = message.header.stamp, message.pose
@@ -82,7 +85,7 @@ def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]
 
 
 def twist_in(data_type: Any, entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that converts a Twist or TwistStamped to a velocity in the plane."""
+    """Return a function that converts a Twist(Stamped) message to a velocity in the plane."""
     stamped = entry.type.endswith("Stamped")
 
     def convert(message: Any) -> Any:
@@ -118,9 +121,9 @@ def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 
 
 def scan_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return a function that converts distances to a LaserScan.
+    """Return a function that converts the distances of a range scan to a LaserScan message.
 
-    Missing ones are infinite (REP 117).
+    A missing distance becomes infinity (REP 117).
     """
     header, message = _header(entry, stamps), message_type(entry.type)
 
@@ -143,7 +146,10 @@ class _Speed:
         self._before: tuple[Time, Pose2D] | None = None
 
     def since(self, tm: Time, pose: Pose2D) -> Velocity2D:
-        """Return the velocity since the previous pose. The first is 0."""
+        """Return the velocity since the pose of the previous call, in m/s ahead and rad/s.
+
+        The first call returns 0.
+        """
         before, self._before = self._before, (tm, pose)
         if before is None or (past_us := tm.us - before[0].us) <= 0:
             return Velocity2D()

@@ -98,7 +98,7 @@ _DIAGNOSTICS: Final[Schema] = {
 
 
 def parse_table(text: str, name: str) -> topic_entry.TopicTable:
-    """Parse a table of ports and topics.
+    """Parse the table that assigns ports of components to ROS 2 topics.
 
     Args:
         text: text of the whole file.
@@ -106,7 +106,7 @@ def parse_table(text: str, name: str) -> topic_entry.TopicTable:
 
     Raises:
         ValueError: the table is invalid. The message has a line for each mistake, with file and
-            line.
+            line number.
     """
     top = read_section(text)
     top.read(_TOP)

@@ -53,7 +53,7 @@ class TopicEntry:
 
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return an entry for a message type, with the type's default frames and stop time."""
+    """Return the default entry for a message type, with its default frame names and stop time."""
     stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")
@@ -62,13 +62,13 @@ def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
 
 @dataclass(frozen=True, slots=True)
 class TopicTable:
-    """The ports that have topics.
+    """Table that assigns ports of components to ROS 2 topics.
 
     Attributes:
-        entries: entries with a port and a topic each. None joins every port that has a matching
-            message type to a topic of the port's name.
+        entries: entries with a port and a topic each. None means that each port with a matching
+            message type has a topic of the same name as the port.
         diagnostics: topic for the states of the components, empty for none.
-        period_us: interval at which these states are published.
+        period_us: interval in us at which these states are published.
     """
 
     entries: tuple[TopicEntry, ...] | None = None

@@ -23,12 +23,12 @@ _LOG: Final = log_of(__name__)
 
 
 class TopicWriter:
-    """A writer to a topic. The first message, or `open`, opens the topic.
+    """Writer of a ROS 2 topic, which sends the values of an OutPort as messages.
 
-    Call all methods in one thread.
+    The topic is opened by the first message or by `open`. Call all methods in one thread.
 
     Args:
-        participant: participant in the domain.
+        participant: participant in the DDS domain.
         entry: port and topic of the writer.
 
     Attributes:
@@ -50,11 +50,12 @@ class TopicWriter:
             _LOG.warning("%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error))
 
     def put(self, message: Any) -> PortStatus:
-        """Write a message, without waiting for the readers of the topic.
+        """Write a message to the topic, without waiting for its readers.
 
         Returns:
-            INVALID_ARGS if a number of the message does not fit, BUFFER_TIMEOUT if too many
-            messages wait for readers already, or PORT_ERROR if the topic cannot be opened.
+            PORT_OK on success, INVALID_ARGS if a number of the message does not fit, BUFFER_TIMEOUT
+            if too many messages already wait for readers, or PORT_ERROR if the topic cannot be
+            opened.
         """
         if self._writer is None:
             self.open()
@@ -101,12 +102,12 @@ class _Arrivals(Listener):
 
 
 class TopicReader:
-    """A reader of a topic that passes on its messages.
+    """Reader of a ROS 2 topic, which calls a function with each message for an InPort.
 
-    Call all methods except the constructor in this thread.
+    Call all methods except the constructor in the thread that is given as `thread`.
 
     Args:
-        participant: participant in the domain.
+        participant: participant in the DDS domain.
         entry: port and topic of the reader.
         thread: thread that reads the topic.
         put: function that is called with each message, and with None if no message came for too
