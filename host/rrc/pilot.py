@@ -47,7 +47,7 @@ class PilotView:
 
     Attributes:
         now_us: time of the snapshot in us.
-        drives: who drives the chair: the host, the stick, or nobody.
+        drives: driver of the chair: the host, the stick, or none.
         aim_pct: translation and rotation that the host drives while the dead-man key is held, in
             per cent.
         held: whether the dead-man key is held.

@@ -29,7 +29,10 @@ _PROBE_US: Final = 1_000_000
 
 
 def probe() -> Script[None]:
-    """Request the device type again and again until the node answers. An abort is an answer too."""
+    """Script that requests the device type of a node repeatedly until the node answers.
+
+    An SDO abort is an answer too.
+    """
     while True:
         try:
             yield from upload_number(_DEVICE_TYPE, 0)
@@ -44,9 +47,9 @@ def probe() -> Script[None]:
 def boot(
     entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]
 ) -> Script[tuple[PdoLayout, ...]]:
-    """Set up a node and return its enabled PDOs.
+    """Script that sets up a node after its boot-up, and returns the layouts of its enabled PDOs.
 
-    The set-up checks the identity, and writes heartbeat, values and PDOs.
+    It checks the identity of the node, and writes its heartbeat time, configured values and PDOs.
 
     Raises:
         WrongIdentity: the node is another device.
@@ -67,7 +70,14 @@ def boot(
 
 
 def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
-    """Disable a PDO, write the given parameters, and enable the PDO if it has a CAN-ID."""
+    """Script that configures a PDO of a node: disable it, write its parameters, enable it.
+
+    The PDO stays disabled if it has no CAN-ID.
+
+    Args:
+        index: index of the communication parameter, such as 1800h.
+        pdo: parameters to write. A value of None is not written.
+    """
     cob_id = pdo.cob_id
     if cob_id is None:
         cob_id = (yield from upload_number(index, _COB_ID)) & ~INVALID

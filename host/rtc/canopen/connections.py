@@ -17,17 +17,17 @@ from tickrig.host.rtc.system.manager import Manager
 
 
 class PortConnections:
-    """The wanted connections of ports. Each connection is made as soon as both ports exist.
+    """Connections between ports that a server should make, each as soon as both ports exist.
 
-    If a component goes and returns, its connections are made again.
+    If a component is removed and returns, its connections are made again.
 
     Args:
         manager: manager with the ports.
-        wanted: connectors to make.
+        wanted: connections to make.
         notify: function that is called with the result of each attempt.
 
     Attributes:
-        wanted: connectors that have not been made.
+        wanted: connections that have not been made.
     """
 
     def __init__(
@@ -66,7 +66,10 @@ class PortConnections:
         self.wanted += (_entry(profile) for profile in profiles)
 
     def forget(self, first: str, second: str) -> bool:
-        """Give up a scheduled connection. Return False if it is not scheduled."""
+        """Remove a connection from those that are still to be made.
+
+        Return False if it is not one of them.
+        """
         ends = {first, second}
         waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]
         self.wanted = [entry for entry in self.wanted if entry not in waiting]
@@ -89,7 +92,7 @@ class PortConnections:
 
 
 def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
-    """Return whether the components of a connection exist.
+    """Return whether both components of a connection exist, so that it can be made.
 
     Raise RtcRefused if a component exists, but not its port.
     """
@@ -106,9 +109,10 @@ def _entry(profile: ConnectorProfile) -> definition.RtConnection:
 
 
 class PdoLinks:
-    """PDO links between nodes, made when both nodes are ready.
+    """PDO links between nodes, by which a node directly receives a PDO that another node sends.
 
-    A link sets the CAN-ID of an RPDO, so that it receives the TPDO of another node.
+    A link sets the CAN-ID of an RPDO of one node to that of a TPDO of the other node. It is made
+    when both nodes are ready.
 
     Args:
         nodes: nodes by node-ID.
@@ -128,7 +132,10 @@ class PdoLinks:
         self._own: dict[definition.PdoName, int] = {}  # CAN-ID of an RPDO without its link
 
     def add(self, now_us: int, link: definition.PdoLink) -> None:
-        """Add a link and make it. Raise ServerRefused if it is impossible now."""
+        """Add a PDO link and make it.
+
+        Raise ServerRefused if that is not possible now.
+        """
         for other in self.links:
             if other.target == link.target:
                 raise definition.ServerRefused(f"{other.source} and {other.target} are linked")
@@ -146,9 +153,10 @@ class PdoLinks:
         self._write(now_us, link, own, linked=False)
 
     def make(self, now_us: int, node_id: int) -> None:
-        """Make the links of a node that has become ready.
+        """Make the PDO links of a node that has just become ready.
 
-        If the node is only the source of a link whose target was not reset, the link still exists.
+        A link still exists and is not made again if the node is only its source, and its target was
+        not reset.
         """
         for link in self.links:
             if link.target.node == node_id:
@@ -163,7 +171,10 @@ class PdoLinks:
                     self._make(now_us, link)
 
     def layout(self, name: definition.PdoName) -> PdoLayout:
-        """Return a PDO of a ready node. Raise ServerRefused if the node does not have it."""
+        """Return the layout of a PDO of a node that is ready.
+
+        Raise ServerRefused if the node is not ready, or does not have the PDO.
+        """
         if name.node not in self._nodes or not self._ready(name.node):
             raise definition.ServerRefused(f"node {name.node} is not ready")
         return find_layout(name, self._nodes[name.node].layouts)
@@ -210,9 +221,10 @@ def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLa
 
 
 def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
-    """Raise ServerRefused if the frames of the two PDOs differ in length.
+    """Raise ServerRefused if the two PDOs of a link differ in length.
 
-    An RPDO with Booleans contains dummy bits as filling. A TPDO with the same Booleans does not.
+    The lengths of the frames in bytes are compared. An RPDO with Booleans is filled up with dummy
+    bits, but a TPDO with the same Booleans is not, so the number of bits may differ.
     """
     if source.size != target.size:
         raise definition.ServerRefused(

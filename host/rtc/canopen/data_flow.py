@@ -21,9 +21,10 @@ _Send = Callable[[int, bytes], None]
 
 
 class PdoDataFlow:
-    """The data flow by PDO: received PDOs go to OutPorts, and values of InPorts are sent.
+    """Transfer of values between the bus and ports by PDO.
 
-    Data are transferred while the proxy is Active. Data to the device also wait until the device is
+    Received TPDOs are written to OutPorts of the proxies, and values at InPorts are sent as RPDOs.
+    This happens while the proxy is Active. Data to the device also wait until the device is
     Operational.
 
     Args:
@@ -57,7 +58,7 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Rebuild the tables whenever an InPort of a new proxy gets or loses a connector."""
+        """Update the routing tables whenever an InPort of a new proxy gets or loses a connector."""
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:
                 port.on_connect.append(lambda _: self.route())
@@ -65,7 +66,10 @@ class PdoDataFlow:
         self.route()
 
     def receive(self, now_us: int, frame: CanFrame) -> bool:
-        """Process a received frame. Return False if the frame is not a PDO of a proxy."""
+        """Write the values of a received PDO to the OutPorts of its proxy.
+
+        Return False if the frame is not a PDO of a proxy.
+        """
         routes = self._sources.get(frame.can_id, ())
         for node, source in routes:
             if len(frame.data) < source.size:
@@ -112,11 +116,12 @@ class PdoDataFlow:
 
 
 class SdoDataFlow:
-    """The data flow by SDO: objects are read for OutPorts, and values of InPorts are written.
+    """Transfer of values between objects of devices and ports by SDO.
 
-    Transfers happen while a proxy is Active and its device Operational. Each port with a pending
-    transfer is transferred once a period at most. One job transfers all such ports of a proxy, and
-    the next job begins in the period after the end of this job.
+    Objects are read for OutPorts of the proxies, and values at InPorts are written to objects. This
+    happens while the proxy is Active and its device Operational. Each port is transferred at most
+    once a period. One job transfers all waiting ports of a proxy, and the next job begins in the
+    period after the end of this job.
 
     Args:
         nodes: nodes by node-ID.
@@ -147,9 +152,11 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Write a value for a port in the next period, without using a connector.
+        """Schedule a value for an InPort, without a connector.
 
-        Return None if the port is unknown.
+        It is written to the device in the next period.
+
+        Return None if the port is unknown, otherwise the result.
         """
         for node in self._nodes.values():
             for sink in node.proxy.sdo_sinks if node.proxy else ():

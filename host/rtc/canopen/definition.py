@@ -22,11 +22,10 @@ from tickrig.wire.rtc_canopen import PortDirection
 
 
 class DefinitionError(ValueError):
-    """The System Definition cannot be used.
+    """The System Definition (settings of the CANopen server) or an EDS file in it cannot be used.
 
     Attributes:
-        line: number of the line with the error, from 1, or 0 if the error is in no line of the
-            text.
+        line: number of the line with the error, from 1, or 0 if no line is known.
     """
 
     def __init__(self, message: str, line: int = 0) -> None:
@@ -35,7 +34,7 @@ class DefinitionError(ValueError):
 
 
 class ServerRefused(ValueError):  # noqa: N818 - what the server did
-    """The server cannot execute a command."""
+    """The CANopen server cannot execute a command, for example because a node is not ready."""
 
 
 # A System Definition: nodes of a bus, and what joins them (NEDO report, Fig. 108; ours: K16).
@@ -57,11 +56,12 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True, order=True)
 class PdoName:
-    """The name of a PDO of a node, such as `16.tpdo2`.
+    """Name of a PDO of a node in a System Definition, such as `16.tpdo2`.
 
     Attributes:
         node: node-ID of the node.
-        pdo: name of the PDO, `tpdo1`.. or `rpdo1`.., from the point of view of the device.
+        pdo: name of the PDO within the node, `tpdo1`.. if the device sends it, or `rpdo1`.. if the
+            device receives it.
     """
 
     node: int
@@ -79,7 +79,15 @@ class PdoName:
 
 @dataclass(frozen=True, slots=True)
 class BusEntry:
-    """The bus, as python-can names it. For a value of None, the command line decides."""
+    """The CAN bus in a System Definition, as python-can selects it.
+
+    For a value of None, the command line decides.
+
+    Attributes:
+        channel: channel, such as `can0`.
+        interface: python-can interface, such as `socketcan`.
+        bitrate: bit rate in bit/s.
+    """
 
     channel: str | None = None
     interface: str | None = None
@@ -88,15 +96,18 @@ class BusEntry:
 
 @dataclass(frozen=True, slots=True)
 class MasterEntry:
-    """The server's own settings as a CANopen node.
+    """Settings of the server itself in a System Definition.
+
+    The server is the NMT master of the bus.
 
     Attributes:
         node: node-ID of the server.
         heartbeat_ms: producer heartbeat time of the server, or 0 for no heartbeat.
         rate_hz: rate of the execution context of the proxies.
-        remove_after_ms: time without a frame of the node after which its proxy is removed.
+        remove_after_ms: time without a frame of a node after which its proxy is removed.
         reconnect: whether the connections of a proxy are made again when it returns.
-        leave: state in which the server leaves the nodes: `pre_operational` or `stopped`.
+        leave: state in which the server leaves the nodes at its end: `pre_operational` or
+            `stopped`.
         sync_ms: communication cycle period, or 0 for no SYNC.
     """
 
@@ -111,7 +122,9 @@ class MasterEntry:
 
 @dataclass(frozen=True, slots=True)
 class PdoEntry:
-    """Parameters that the server writes into a PDO. A value of None keeps the value of the device.
+    """Parameters that the server writes into a PDO of a node.
+
+    A value of None keeps the value of the device.
 
     Attributes:
         mapping: objects that the PDO carries.
@@ -131,13 +144,13 @@ class PdoEntry:
 
 @dataclass(frozen=True, slots=True)
 class SdoPortEntry:
-    """A port for an object that is read or written by SDO.
+    """Port of a proxy in a System Definition whose value is transferred by SDO instead of a PDO.
 
     Attributes:
         index: index of the object. All elements of an array are one value.
         direction: `out` if the object is read for the port, `in` if it is written from the port.
-        type: name of the type in Table 4, or None for the name that belongs to the data type in the
-            EDS.
+        type: name of the type in Table 4, or None for the default type of the object's data type in
+            the EDS.
     """
 
     index: int
@@ -147,13 +160,13 @@ class SdoPortEntry:
 
 @dataclass(frozen=True, slots=True)
 class NodeEntry:
-    """A node of the System Definition.
+    """Settings of one node of the bus in a System Definition.
 
     Attributes:
         id: node-ID of the node.
-        name: instance name of the node's proxy.
-        eds: EDS of the node. Its path is relative to the System Definition.
-        role: the role of the node.
+        name: instance name of the proxy that represents the node.
+        eds: path of the node's EDS file, relative to the System Definition.
+        role: type of the device: DeviceRTC, CiA 402 drive, or other CANopen device.
         heartbeat_ms: producer heartbeat time of the node.
         ports: names of ports by PDO, such as `tpdo2`.
         pdos: parameters that are written into PDOs, by PDO.
@@ -174,9 +187,13 @@ class NodeEntry:
 
 @dataclass(frozen=True, slots=True)
 class SdoEntry:
-    """A value that is written while its node boots.
+    """A value that the server writes into an object of a node while it sets up the node.
 
     Attributes:
+        node: node-ID of the node.
+        index: index of the object.
+        sub: sub-index of the object.
+        value: value to write.
         size: size of the value in bytes: 1, 2, 4 or 8.
     """
 
@@ -194,7 +211,12 @@ class SdoEntry:
 
 @dataclass(frozen=True, slots=True)
 class PdoLink:
-    """A link by which an RPDO of one node directly receives a TPDO of another node."""
+    """A link by which one node directly receives a PDO of another node, without the PC.
+
+    Attributes:
+        source: TPDO of the sending node.
+        target: RPDO of the receiving node.
+    """
 
     source: PdoName
     target: PdoName
@@ -211,7 +233,7 @@ class RtConnection:
 
 @dataclass(frozen=True, slots=True)
 class StartEntry:
-    """The order of activating the nodes, and whether they are activated automatically.
+    """Order in which the server activates the nodes, and whether it does so automatically.
 
     Attributes:
         order: node-IDs in the order of activation. Nodes that are left out follow in the order of
@@ -262,12 +284,12 @@ TPDOS: Final = range(0x1800, 0x1A00)
 
 @dataclass(frozen=True, slots=True)
 class MappableObject:
-    """An object that PDOs of a device may carry.
+    """An object of a device that its PDOs can carry, according to the EDS.
 
     Attributes:
         mapped: mapping entry of the object.
         name: name of the object in the EDS.
-        way: direction of the PDOs, which is Access.TPDO, Access.RPDO or both.
+        way: direction of the PDOs that can carry it: Access.TPDO, Access.RPDO or both.
     """
 
     mapped: MappedObject
@@ -277,16 +299,17 @@ class MappableObject:
 
 @dataclass(frozen=True, slots=True)
 class DeviceFile:
-    """The description of a device type, as read from its EDS.
+    """Data about a device type that the server reads from its EDS file.
 
     Attributes:
-        identity: values of `_IDENTITY` that the file contains.
+        identity: values of the device type and identity objects (1000h, 1018h) that the file
+            contains.
         defaults: power-on values in the file, as bytes. The node-ID is not added.
         data_types: data types by index and sub-index.
-        pdos: PDO communication parameters of the device.
+        pdos: indices of the PDO communication parameters of the device.
         relative: keys of `defaults` to whose values a device adds its node-ID.
         findings: errors in the file. Objects with errors are not used.
-        mappable: objects that the PDOs of the device may carry.
+        mappable: objects that the PDOs of the device can carry.
     """
 
     identity: Mapping[tuple[int, int], int]

@@ -126,7 +126,14 @@ def _checked(allows: Callable[[Any], bool], what: str) -> _Reader:
 
 
 def whole(low: int, high: int) -> _Reader:
-    """Return a reader of a whole number in a range, written in decimal or as 0x..."""
+    """Return a function that reads and checks a whole number of a definition.
+
+    The number is written in decimal or as 0x...
+
+    Args:
+        low: lowest allowed number.
+        high: highest allowed number.
+    """
     what = f"a whole number in {low}..{high}"
     return _checked(lambda value: type(value) is int and low <= value <= high, what)
 
@@ -201,7 +208,7 @@ _PORT: Final = re.compile(r"[A-Za-z_]\w*\.\w+", re.ASCII)
 
 
 def read_definition(path: Path) -> definition.SystemDefinition:
-    """Read a System Definition.
+    """Read a System Definition (settings of the CANopen server) from a file.
 
     Raises:
         OSError: the file cannot be read.
@@ -216,7 +223,7 @@ def read_definition(path: Path) -> definition.SystemDefinition:
 
 
 def parse_definition(content: str) -> definition.SystemDefinition:
-    """Read a System Definition.
+    """Read a System Definition (settings of the CANopen server) from a YAML or JSON text.
 
     Raises:
         DefinitionError: the text is not a valid definition. The error has the line and the reason.

@@ -53,13 +53,12 @@ _Dumper.add_representer(Role, _represent_role)
 
 
 def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
-    """Write a System Definition. If that fails, the old file is kept unchanged.
+    """Save a System Definition as a file. If that fails, an existing file is kept unchanged.
 
     Args:
-        definition: System Definition to write.
-        folder: folder to which the paths of the EDS files are relative now.
-        path: path of the file. In the file, the paths of EDS files are relative to the folder of
-            the file.
+        definition: System Definition to save.
+        folder: folder to which the paths of the EDS files in the definition are relative.
+        path: path of the file. In the file, the paths of EDS files are relative to its folder.
 
     Raises:
         OSError: the file cannot be written.

@@ -50,10 +50,11 @@ class ServerEventType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ServerEvent:
-    """An event of the server.
+    """Event of a CANopen server, such as a lost node, which is logged and shown to the user.
 
     Attributes:
-        at_us: time on the clock of the server.
+        at_us: time of the event in us, on the clock of the server.
+        kind: kind of the event.
         node: node-ID, or 0 if the event belongs to no node.
         text: additional text for the user.
     """
@@ -87,7 +88,7 @@ class Notify(Protocol):
 
 
 class EventLog:
-    """The events of a server. The latest event is last.
+    """Latest events of a CANopen server, oldest first. It calls listeners with new events.
 
     Attributes:
         listeners: functions that are called with each event as it happens.

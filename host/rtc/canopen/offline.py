@@ -27,9 +27,14 @@ _Layouts = tuple[PdoLayout, ...]
 def boot_offline(
     entry: definition.NodeEntry, file: definition.DeviceFile, writes: Iterable[definition.SdoEntry]
 ) -> _Layouts | None:
-    """Boot a node from its EDS alone, without a bus. Return the PDOs that will be enabled.
+    """Simulate the set-up of a node from its EDS, without a bus, and return its enabled PDOs.
 
-    Return None if the EDS does not contain the needed values.
+    The result is None if the EDS does not contain the needed values.
+
+    Args:
+        entry: settings of the node.
+        file: content of the node's EDS.
+        writes: values that are written while the node boots.
     """
     values = dict(file.defaults)
     script = boot(entry, file, writes)
@@ -60,11 +65,13 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | 
 
 
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
-    """Return the settings that the nodes will refuse, provided that they match their EDS.
+    """Check a System Definition without a bus.
 
-    The result also names PDOs that several nodes send with one COB-ID, although no node refuses
-    them. Two things are not checked: nodes whose EDS lacks values, and components that do not
-    exist.
+    Return the settings that nodes will refuse, as texts.
+
+    The check assumes that the nodes match their EDS. The result also names PDOs that several nodes
+    send with one COB-ID, although no node refuses them. Two things are not checked: nodes whose EDS
+    lacks values, and components that do not exist.
 
     Args:
         server: server that gets proxies without devices. The server cannot be used otherwise
@@ -130,10 +137,13 @@ def _connections(server: RtcCanopenServer) -> Iterator[str]:
 
 
 def draw_graph(server: RtcCanopenServer) -> str:
-    """Return a graph of the system, with connections through the PC, and with dashed PDO links.
+    """Return a drawing of the system in the language of Graphviz.
+
+    Connections through the PC are solid, and PDO links are dashed.
 
     Args:
-        server: server that cannot be used otherwise afterwards, as after `check_offline`.
+        server: server of the system. It cannot be used otherwise afterwards, as after
+            `check_offline`.
     """
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}

@@ -156,16 +156,16 @@ class _RestartCounter:
     def by_hand(self) -> bool:
         """Cancel automatic restarts, because the user restarts the node.
 
-        Return whether the node was lost while it was Active.
+        Return whether the node was Active when it was lost.
         """
         active = self.was_active or self.to_activate
         self.forget()
         return active
 
     def take(self, now_us: int) -> str:
-        """Count a restart that begins now.
+        """Count an automatic restart that begins now, and return its number, such as `1 of 3`.
 
-        Return its number, such as `1 of 3`, or an empty text if no restart is left.
+        The result is an empty text if no restart is left.
         """
         if self._made >= self._most:
             self.pending = False
@@ -188,18 +188,21 @@ _STATES: Final = {
 
 
 class NodeOperations:
-    """The link between a proxy and its device: it executes requests, and tracks the device state.
+    """Keeps a proxy and its CANopen device in the same state.
+
+    It executes the requests of the proxy on the bus, and moves the proxy when the NMT state of the
+    device changes.
 
     Args:
-        entry: entry of the node.
-        dialogue: dialogue with the node.
+        entry: settings of the node.
+        dialogue: SDO and NMT dialogue with the node.
         notify: function that is called with events.
 
     Attributes:
-        proxy: RT component of the node, or None if there is no proxy.
+        proxy: RT component that represents the device, or None if there is no proxy.
         nmt_state: last reported NMT state of the device, or None before the first report.
-        now_us: the current time.
-        resetting: whether a reset that the RT side requested is not finished.
+        now_us: present time in us.
+        resetting: whether a reset that the proxy requested is not finished.
         restart: counter of the automatic restarts that are left.
     """
 
@@ -218,7 +221,11 @@ class NodeOperations:
         return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
-        """Execute the proxy's request on the bus, unless the device is in that state already."""
+        """Send the proxy's recorded request to the device, unless it is already in that state.
+
+        Args:
+            lost: whether the heartbeat of the device is late.
+        """
         if self.proxy is None or (requested := self.proxy.take_request()) is NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
@@ -239,7 +246,12 @@ class NodeOperations:
                 self._run("reset", self._life.reset(self._entry))
 
     def follow(self, state: NmtState, *, changed: bool) -> None:
-        """Move the proxy to the state of the device, unless a request will change that state."""
+        """Move the proxy to the state of the device, unless a request will change that state.
+
+        Args:
+            state: NMT state that the device reported.
+            changed: whether the state differs from the previous report.
+        """
         proxy = self.proxy
         if proxy is None or self._dialogue.moves or proxy.requested is not NOTHING:
             return
@@ -266,7 +278,7 @@ class NodeOperations:
         self._stopping = False
 
     def booted(self) -> None:
-        """Record that the device is Pre-operational and set up. The proxy may then leave Error."""
+        """Record that the device is set up and Pre-operational. The proxy may then leave Error."""
         self.nmt_state, self.resetting = NmtState.PRE_OPERATIONAL, False
         if self.proxy is not None:
             self._leave_error(self.proxy)
@@ -292,10 +304,12 @@ class NodeOperations:
             proxy.contexts[0].reset_component(proxy)
 
     def begin_restart(self, *, to_start: bool = False) -> bool:
-        """Use up one restart and report it. Return False if no restart is left.
+        """Use up one automatic restart and report it as an event.
+
+        Return False if no restart is left.
 
         Args:
-            to_start: whether the node is activated without a restart.
+            to_start: whether the node will be activated anyway, without a restart.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

@@ -76,9 +76,11 @@ _DUMMIES: Final = tuple(
 
 
 def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.MappableObject, ...]:
-    """Return the objects that a PDO may carry. The dummies are last.
+    """Return the objects that can be mapped into a PDO, with the dummy objects last.
 
-    `index` is the index of the PDO's communication parameter.
+    Args:
+        file: content of the node's EDS.
+        index: index of the PDO's communication parameter.
     """
     way = Access.TPDO if index in definition.TPDOS else Access.RPDO
     return tuple(one for one in (*file.mappable, *_DUMMIES) if way in one.way)
@@ -87,11 +89,11 @@ def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.Mappab
 def with_entry(
     pdo: PdoDescription, place: int, entry: MappedObject | None, *, insert: bool = False
 ) -> PdoDescription:
-    """Return a copy of a PDO in which one mapping entry is changed.
+    """Return a copy of a PDO in which one mapping entry is replaced, inserted or removed.
 
     Args:
-        pdo: present PDO.
-        place: position of the entry, from 0.
+        pdo: PDO to copy.
+        place: position of the entry in the mapping, from 0.
         entry: new entry at this position, or None to remove the present entry.
         insert: whether to insert the entry before the present entry, instead of replacing it.
 
@@ -113,7 +115,12 @@ def with_entry(
 
 
 def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
-    """Return a copy of a PDO with another COB-ID. Raise ValueError for an invalid CAN-ID."""
+    """Return a copy of a PDO with the CAN-ID that the user typed, such as `290h`.
+
+    Its flags are kept.
+
+    Raise ValueError if the text is not a CAN-ID that a PDO may have.
+    """
     text = words.strip().lower()
     try:
         number = int(text[:-1], 16) if text.endswith("h") else int(text, 0)
@@ -129,9 +136,14 @@ def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
 
 
 def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription:
-    """Return a copy of a PDO with another transmission type.
+    """Return a copy of a PDO with the transmission type that the user typed, such as `255`.
 
     Raise ValueError if CiA 301 has no such type.
+
+    Args:
+        pdo: PDO to copy.
+        words: text that the user typed.
+        sends: whether the PDO is a TPDO.
     """
     try:
         number = int(words, 0)
@@ -147,7 +159,7 @@ def with_type(pdo: PdoDescription, words: str, *, sends: bool) -> PdoDescription
 def switched(pdo: PdoDescription) -> PdoDescription:
     """Return a copy of a PDO that is switched on if it was off, and off if it was on.
 
-    Raise ValueError if the PDO has no CAN-ID.
+    Raise ValueError if the PDO is off and has no CAN-ID.
     """
     if not pdo.enabled and not pdo.can_id:
         raise ValueError("the PDO has no CAN-ID: give it one first")
@@ -175,7 +187,10 @@ Pdos = Mapping[int, PdoDescription]
 
 
 def read_pdos(file: definition.DeviceFile) -> Script[Pdos]:
-    """Read all PDOs of a node that can be edited, without multiplexed PDOs and 29-bit CAN-IDs."""
+    """Script that reads from a node all its PDOs that can be edited.
+
+    Multiplexed PDOs and PDOs with a 29-bit CAN-ID are left out.
+    """
     found = {}
     for index in file.pdos:
         if (pdo := (yield from _read_pdo(index, file))) is not None:
@@ -282,16 +297,18 @@ def pdo_name(node_id: int, index: int) -> definition.PdoName:
 
 
 class Rewrite:
-    """The task of rewriting the PDOs of a served node. The node is then set up again.
+    """Task that writes changed PDOs into a node and then sets up the node again.
 
     Args:
         node: node to change.
         before: PDOs that the node has.
-        wanted: the new descriptions of some of these PDOs.
-        linked: PDOs that receive the TPDO of another node. Their CAN-ID belongs to that TPDO.
+        wanted: new descriptions of those PDOs that change.
+        linked: PDOs that are linked with a TPDO of another node. Their CAN-ID is that of the TPDO,
+            so it cannot be changed.
 
     Raises:
-        ServerRefused: the node does not answer SDO requests now, or a CAN-ID belongs to a link.
+        ServerRefused: the node does not answer SDO requests now, or the CAN-ID of a linked PDO
+            would change.
     """
 
     def __init__(
@@ -310,9 +327,9 @@ class Rewrite:
         self._was_active = proxy is not None and proxy.state is LifeCycleState.ACTIVE
 
     def begin(self) -> Script[None]:
-        """Return the script that rewrites the PDOs.
+        """Return the script that writes the changed PDOs.
 
-        A node that is lost during the script has the old values at its next boot.
+        If the node is lost during the script, it gets the old values at its next boot.
         """
         self._keep(self._wanted, self._before)
         return self._script()
@@ -380,7 +397,7 @@ class _Table:
 
 
 def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
-    """Read from a node all values that its DCF contains: the writable parameters in its EDS.
+    """Script that reads from a node all values for its DCF: the writable parameters in the EDS.
 
     Raises:
         OSError: the EDS cannot be read.
@@ -397,11 +414,11 @@ def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
 def save_dcf(
     path: Path, eds: Path, node_id: int, bit_rate: int, values: Mapping[int, bytes]
 ) -> None:
-    """Write a DCF of a node. If that fails, the old file is kept unchanged.
+    """Save the values read from a node as a DCF. If that fails, an existing file is kept unchanged.
 
     Args:
-        path: path of the file.
-        eds: EDS of the node.
+        path: path of the DCF.
+        eds: path of the node's EDS.
         node_id: node-ID of the node, 1..127.
         bit_rate: bit rate in bit/s.
         values: values read from the node. The key is index << 8 | sub-index.
@@ -415,7 +432,13 @@ def save_dcf(
 
 
 def pdos_of_dcf(path: Path, node_id: int, file: definition.DeviceFile, there: Pdos) -> Pdos:
-    """Return the PDOs in a DCF that differ from the PDOs of a node.
+    """Return those PDOs in a DCF that differ from the present PDOs of a node.
+
+    Args:
+        path: path of the DCF.
+        node_id: node-ID of the node.
+        file: content of the node's EDS.
+        there: PDOs that the node has.
 
     Raises:
         OSError: the DCF cannot be read.

@@ -113,7 +113,7 @@ PARAMETERS = 0x200
 def proxy_index(index: int) -> int:
     """Convert the index of a PDO parameter of a device to the index in its proxy.
 
-    A TPDO of the device is an RPDO of the proxy.
+    A TPDO of the device is an RPDO of the proxy, and vice versa.
 
     >>> f"{proxy_index(0x1801):04X}h {proxy_index(0x1A01):04X}h {proxy_index(0x1400):04X}h"
     '1401h 1601h 1800h'
@@ -137,7 +137,7 @@ class _PdoField:
 
 @dataclass(frozen=True)
 class PdoLayout:
-    """The layout of the data in a PDO.
+    """Positions and types of the objects in a PDO, for conversion from and to port values.
 
     Attributes:
         index: index of the communication parameter in the device.
@@ -192,7 +192,16 @@ def lay_out(
     mapping: tuple[MappedObject, ...],
     data_types: Mapping[tuple[int, int], int],
 ) -> PdoLayout:
-    """Return the layout of a PDO from its mapping. Objects below 20h are dummies without a port."""
+    """Return the layout of a PDO, calculated from its mapping.
+
+    Objects with an index below 20h are dummies, which get no port.
+
+    Args:
+        index: index of the communication parameter.
+        cob_id: CAN-ID of the PDO.
+        mapping: mapped objects in order.
+        data_types: data types in the EDS, by index and sub-index.
+    """
     fields, unknown, shift = list[_PdoField](), list[MappedObject](), 0
     for mapped in mapping:
         data_type = data_types.get((mapped.index, mapped.sub), 0)

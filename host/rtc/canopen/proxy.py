@@ -54,7 +54,7 @@ class _PortShape:
 
 
 class PdoSource:
-    """A TPDO of the device. The values of each received frame are written to OutPorts.
+    """A TPDO of a device, with the proxy's OutPorts to which the received values are written.
 
     Attributes:
         layout: layout of the PDO.
@@ -71,7 +71,12 @@ class PdoSource:
         )
 
     def receive(self, now_us: int, data: bytes) -> None:
-        """Write the values of a received frame to the OutPorts, with the time of reception."""
+        """Write the values of a received frame to the OutPorts, with the time of reception.
+
+        Args:
+            now_us: time of reception in us.
+            data: data of the frame.
+        """
         tm, values = Time.from_us(now_us), self._decode(data)
         if self._single:
             (port,) = self.ports
@@ -84,9 +89,10 @@ class PdoSource:
 
 
 class PdoSink:
-    """An RPDO of the device. Each value that arrives at an InPort is sent in one frame.
+    """An RPDO of a device, with the proxy's InPorts whose values are sent to the device.
 
-    If each object has its own port, the frame has the last values of the other objects.
+    Each value that arrives is sent in one frame. If each object has its own port, the frame has the
+    last values of the other objects.
 
     Attributes:
         layout: layout of the PDO.
@@ -103,7 +109,7 @@ class PdoSink:
         self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
 
     def preset(self, index: int, value: Value) -> None:
-        """Set the value that frames carry for an object until its port gets a value."""
+        """Set the value of an object that frames contain until its port gets a first value."""
         for place, field in enumerate(self.layout.fields):
             if field.mapped.index == index:
                 self._latest[place] = value
@@ -122,7 +128,14 @@ class PdoSink:
                 yield port.name, value
 
     def encode(self, port: str, value: Struct) -> bytes:
-        """Return the frame data for a new value. Raise ValueError if the value does not fit."""
+        """Return the data of the frame that carries a new value of a port.
+
+        Raise ValueError if the value does not fit.
+
+        Args:
+            port: name of the port.
+            value: new value.
+        """
         data: Any = getattr(value, "data", None)
         if not self._shape.single:
             latest = list(self._latest)
@@ -186,7 +199,7 @@ class _SdoPortLayout:
         return tuple(elements)
 
     def decode(self, tm: Time, elements: Sequence[bytes]) -> Struct:
-        """Convert the bytes of all elements to a value of the port.
+        """Convert the bytes read from the object, one item per element, to a value of the port.
 
         Raise FieldError if the bytes are invalid.
         """
@@ -202,7 +215,7 @@ class _SdoPortLayout:
             yield from download(self.index, sub, data)
 
     def encode(self, value: Struct) -> tuple[bytes, ...]:
-        """Convert a value of the port to the bytes of each element.
+        """Convert a value of the port to the bytes to write, one item per element of the object.
 
         Raise ValueError or TypeError if the value does not fit.
         """
@@ -211,7 +224,7 @@ class _SdoPortLayout:
 
 
 class SdoSource:
-    """An object of the device whose value goes to an OutPort.
+    """An object of a device that is read by SDO, with the proxy's OutPort that gets its value.
 
     Attributes:
         layout: layout of the object.
@@ -223,7 +236,7 @@ class SdoSource:
 
 
 class SdoSink:
-    """An object of the device that receives the newest value of an InPort.
+    """An object of a device that is written by SDO, with the proxy's InPort for its value.
 
     Attributes:
         layout: layout of the object.
@@ -236,7 +249,7 @@ class SdoSink:
         self.pending: tuple[bytes, ...] | None = None
 
     def take(self) -> Struct | None:
-        """Take the newest value of the InPort. Return None if there is no new value."""
+        """Remove all values from the InPort. Return the newest one, or None without a new value."""
         value = None
         while self.port.is_new:
             value = self.port.read()
@@ -251,11 +264,14 @@ class SdoSink:
 def lay_out_sdo_ports(
     entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
 ) -> tuple[tuple[_SdoPortLayout, ...], tuple[str, ...]]:
-    """Return the ports of a node's SDO objects, and the reasons for impossible ports.
+    """Return the layouts of a node's ports that are transferred by SDO.
 
     Args:
-        entry: entry of the node.
+        entry: settings of the node.
         data_types: data types in the node's EDS, by index and sub-index.
+
+    Returns:
+        The layouts of the ports, and a text for each port that is not possible.
     """
     made, refused = list[_SdoPortLayout](), list[str]()
     for name, port in entry.sdo_ports.items():
@@ -305,7 +321,7 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
-    """A request by the RT side that the server has not yet sent to the bus."""
+    """Request of a proxy to its device that the server has not sent to the bus yet."""
 
     NOTHING = auto()
     ACTIVATE = auto()
@@ -375,7 +391,7 @@ class ProxyRtc(RtComponent):
 
     @property
     def state(self) -> LifeCycleState:
-        """State of the proxy in its execution context, or Created if it has no context."""
+        """Life-cycle state of the proxy in its execution context, or Created without a context."""
         return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
 
     def take_request(self) -> ProxyRequest:

@@ -18,7 +18,7 @@ _FULL_PCT: Final = 100.0
 
 
 class Joystick(RtComponent):
-    """A joystick that writes the velocity of its stick in each period.
+    """Component that writes the velocity of a simulated joystick in each period.
 
     Attributes:
         velocity: OutPort with the velocity, forward in m/s, and to the left in rad/s.
@@ -35,12 +35,21 @@ class Joystick(RtComponent):
         self._forward_pct = self._left_pct = 0.0
 
     def tilt(self, forward_pct: float, left_pct: float = 0.0) -> None:
-        """Set the stick to -100..100 % on each axis. Values outside are limited to this range."""
+        """Set the position of the stick, in per cent of its full deflection.
+
+        Args:
+            forward_pct: deflection to the front, limited to -100..100 %.
+            left_pct: deflection to the left, limited to -100..100 %.
+        """
         self._forward_pct = clip(forward_pct, _FULL_PCT)
         self._left_pct = clip(left_pct, _FULL_PCT)
 
     def typed(self, line: str) -> None:
-        """Set the stick by typed text: forward in per cent, and optionally to the left."""
+        """Set the position of the stick by a line that the user typed, such as `50` or `50 -20`.
+
+        The numbers are the deflection to the front and, optionally, to the left, each in -100..100
+        %.
+        """
         try:
             percents = [float(word) for word in line.split()]
         except ValueError:
@@ -109,10 +118,10 @@ class WheeledBase(RtComponent, ABC):
 
     @abstractmethod
     def turned(self, since_s: float) -> tuple[float, float]:
-        """Return the rotation of the wheels of each side since the last call, in rad.
+        """Return how far the left and the right wheels have turned since the last call, in rad.
 
         Args:
-            since_s: time since the last call.
+            since_s: time since the last call in s.
         """
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -161,14 +170,15 @@ _FASTEST_RPM: Final = 8_000
 
 
 class Beego(WheeledBase):
-    """A robot that sends two drives motor velocities in rpm, and reads their positions in counts.
+    """Component for the robot beego, which has two wheels on CANopen drives of the type EPOS.
 
+    The component sends motor velocities in rpm to the drives, and reads their positions in counts.
     The maker's dimensions of the robot are not available. The dimensions in the configuration are
     those of `examples/rigs/beego.toml`.
 
     Attributes:
-        speeds: OutPorts `left_speed` and `right_speed`, for 60FFh.
-        positions: InPorts `left_position` and `right_position`, for 6064h.
+        speeds: OutPorts `left_speed` and `right_speed`, for object 60FFh.
+        positions: InPorts `left_position` and `right_position`, for object 6064h.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Beego", "Base on two EPOS", category="RTC-CANopen")
@@ -227,15 +237,14 @@ _FULL: Final = 32_767
 
 
 class FourX(WheeledBase):
-    """A robot that steers like a tank, in velocity mode.
+    """Component for the robot FourX, whose four wheels are driven by CANopen motor units.
 
-    The pose is integrated from measured speeds.
-
-    If no new speed arrives, the last one is used.
+    The robot steers like a tank. The units are in velocity mode. The pose is integrated from
+    measured speeds. If no new speed arrives, the last one is used.
 
     Attributes:
-        references: OutPorts `fl_reference` and so on, for 6411h:01.
-        speeds: InPorts `fl_speed` and so on, for 6401h:02.
+        references: OutPorts `fl_reference` and so on, for object 6411h:01.
+        speeds: InPorts `fl_speed` and so on, for object 6401h:02.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("FourX", "Base on four wheels", category="RTC-CANopen")

@@ -24,7 +24,13 @@ def serve(
     until_us: int = NEVER,
     done: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Run a server until a time on the link's clock, or until `done()` is true.
+    """Run a CANopen server on a bus until a time on the link's clock, or until `done()` is true.
+
+    Args:
+        server: server to run.
+        link: connection to the bus.
+        until_us: time in us at which the run ends.
+        done: function that is called before each tick.
 
     Raises:
         LinkClosed: the bus is closed.
@@ -34,20 +40,20 @@ def serve(
 
 
 class ServerRunner:
-    """A runner that runs a server on a link until `stop` is called.
+    """Runs a CANopen server on a bus until `stop` is called, and serves clients in between.
 
     Args:
         server: server to run.
         link: connection to the bus.
 
     Attributes:
-        running: whether the server runs, which is False once `stop` was called.
+        running: whether the server runs. It is False once `stop` was called.
         late_ticks: number of ticks that began more than 1 ms late.
         worst_late_us: largest delay of a tick in us.
-        after_tick: function that is called with the time after each tick.
+        after_tick: functions that are called with the time in us after each tick.
         serve: function that is called between the ticks, at least every `pause_us`, with the time
             in us that it may take. It can serve a control socket, for example.
-        pause_us: longest time that a served client waits, 20 ms.
+        pause_us: longest time in us that a served client waits, 20 ms by default.
     """
 
     def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
@@ -59,6 +65,9 @@ class ServerRunner:
 
     def run(self, until_us: int = NEVER) -> None:
         """Run the server until a time on the link's clock, or until `stop` is called.
+
+        Args:
+            until_us: time in us at which the run ends. By default, it has no end.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -89,7 +98,7 @@ def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
 
 
 def open_server(path: Path) -> RtcCanopenServer:
-    """Make a server from a System Definition and the EDS files beside it.
+    """Create a CANopen server from the file of a System Definition and the EDS files that it names.
 
     Raises:
         OSError: the definition cannot be read.
@@ -101,7 +110,13 @@ def open_server(path: Path) -> RtcCanopenServer:
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
-    """Read the EDS files of a definition. Each file is read once.
+    """Read the EDS files that a System Definition names, and return them by their path in it.
+
+    Each file is read once.
+
+    Args:
+        definition: System Definition.
+        folder: folder to which the paths of the EDS files are relative.
 
     Raises:
         DefinitionError: a file cannot be used, or lacks a PDO that the definition names.

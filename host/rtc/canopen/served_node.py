@@ -103,11 +103,11 @@ class DuplicateNodeDetector:
             self.sign = f"{answer.index:04X}h:{answer.sub:02X} is {values}"
 
     def receive(self, at_us: int, state: NmtState, *, listening: bool) -> None:
-        """Process a boot-up or heartbeat.
+        """Check a boot-up or heartbeat frame of the node-ID for signs of a second node.
 
         Args:
-            at_us: time of the frame on the bus.
-            state: state in the frame.
+            at_us: time of the frame on the bus in us.
+            state: NMT state in the frame.
             listening: whether nothing was sent to the node since it booted.
         """
         before, self._state = self._state, state
@@ -223,7 +223,7 @@ class NodeServer(Protocol):
         """Schedule a tick of the node at `due_us`."""
 
     def booted(self, node: ServedNode, /) -> None:
-        """Make the proxy if there is none, and the links and connections of the node."""
+        """Create the proxy of a booted node, if it has none, with its links and connections."""
 
     def gone(self, node: ServedNode, /) -> None:
         """Remove the proxy."""
@@ -300,10 +300,10 @@ class ServedNode:
         self._plan()
 
     def restart(self, now_us: int) -> None:
-        """Reset the node from any state, on request of a user.
+        """Reset the node by NMT on request of a user, in any state.
 
-        The proxy is removed. The node is set up when it boots. The node is activated again if it
-        was Active, or was lost while it was Active.
+        The proxy is removed. The node is set up when it boots again. It is then activated if it was
+        Active, or was lost while it was Active.
         """
         operations = self.operations
         operations.now_us = now_us
@@ -330,7 +330,13 @@ class ServedNode:
         self._plan()
 
     def on_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
-        """Process a boot-up or heartbeat frame with its time on the bus. Ignore other data."""
+        """Process a boot-up or heartbeat frame of the node. Frames with other data are ignored.
+
+        Args:
+            now_us: present time in us.
+            at_us: time of the frame on the bus in us.
+            data: data of the frame.
+        """
         try:
             (number,) = data
             state = NmtState(number)

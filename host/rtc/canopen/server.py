@@ -114,7 +114,7 @@ class ServerObjects:
         self._indices = frozenset(index for index, _ in self._table)
 
     def answer(self, data: bytes) -> bytes | None:
-        """Return the answer to a request, or None for an abort and for any other frame."""
+        """Return the SDO response to a request, or None for an abort and for any other frame."""
         try:
             request = sdo.parse_request(data)
         except WireError:
@@ -289,7 +289,12 @@ class RtcCanopenServer:
         self._states: dict[int, LifeCycleState] = {}
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Process the received frames, do all work that is due, and return the frames to send."""
+        """Process the received frames, do all work that is due, and return the frames to send.
+
+        Args:
+            now_us: present time in us.
+            rx: received frames with their times.
+        """
         late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
             self._start()
@@ -339,11 +344,15 @@ class RtcCanopenServer:
         self.due_us = self.now_us
 
     def put(self, name: str, value: Struct) -> ReturnCode:
-        """Send a value to a device through an InPort, given by its full name, without a connector.
+        """Send a value to a device, as if it had arrived at an InPort of its proxy.
+
+        Args:
+            name: full name of the InPort.
+            value: value to send.
 
         Returns:
-            BAD_PARAMETER if there is no such port or the value does not fit,
-            PRECONDITION_NOT_MET while the proxy is not Active or another device sends the PDO.
+            RTC_OK on success. BAD_PARAMETER if there is no such port or the value does not fit.
+            PRECONDITION_NOT_MET while the proxy is not Active, or if another device sends the PDO.
         """
         result = self._by_sdo.put(name, value)
         return self._data.put(name, value) if result is None else result

@@ -32,7 +32,7 @@ NOT_HEARD: Final = -1
 
 @dataclass(frozen=True, slots=True)
 class PortView:
-    """A port of a proxy.
+    """Description of a data port of a proxy or component, as the editor shows it.
 
     Attributes:
         name: full name of the port, such as `Palette0.ai`.
@@ -51,7 +51,7 @@ class PortView:
 
 @dataclass(frozen=True, slots=True)
 class PdoView:
-    """An enabled PDO of a device.
+    """Description of an enabled PDO of a device, as the editor shows it.
 
     Attributes:
         name: name of the PDO, such as `16.tpdo2`.
@@ -70,14 +70,20 @@ class PdoView:
 
 @dataclass(frozen=True, slots=True)
 class NodeView:
-    """A node and its proxy.
+    """Present state of a CANopen node and its proxy, as the editor shows it.
 
     Attributes:
+        node_id: node-ID of the node.
+        name: instance name of the proxy.
+        role: type of the device.
+        phase: phase of the set-up of the node.
         nmt_state: NMT state such as `OPERATIONAL`, empty before the first frame.
-        heartbeat_age_us: time since the last frame, or `NOT_HEARD` before the first frame.
+        heartbeat_age_us: time in us since the last frame, or `NOT_HEARD` before the first frame.
         late: whether the heartbeat of the node is missing.
         proxy_state: state of the proxy such as `ACTIVE`, empty without a proxy.
         problem: reason why the node is refused, empty if it is not refused.
+        ports: ports of the proxy.
+        pdos: enabled PDOs of the device.
     """
 
     node_id: int
@@ -95,10 +101,13 @@ class NodeView:
 
 @dataclass(frozen=True, slots=True)
 class ComponentView:
-    """A component that is not a proxy.
+    """Present state of a component that does not represent a node, as the editor shows it.
 
     Attributes:
+        name: instance name of the component.
+        type_name: type name of the component.
         state: state of the component, such as `ACTIVE`.
+        ports: data ports of the component.
     """
 
     name: str
@@ -122,10 +131,12 @@ _T = TypeVar("_T")
 
 
 class PendingTransfer(Generic[_T]):
-    """The result of SDO transfers for a caller that waits.
+    """Result of SDO transfers that run in the background.
+
+    The caller checks `done` from time to time.
 
     Args:
-        empty: result until the transfers have ended.
+        empty: value of `data` until the transfers have ended.
 
     Attributes:
         done: whether the transfers have ended.
@@ -152,11 +163,10 @@ class PendingTransfer(Generic[_T]):
 
 
 class ServerView:
-    """A view that reads the state of a server and sends it commands.
+    """Interface by which the editor reads the state of a CANopen server and sends it commands.
 
-    Use the view between the ticks of the server and in its thread.
-
-    Commands return at once. The results appear in the states and events.
+    Use it between the ticks of the server and in the server's thread. Commands return at once, and
+    their results appear later in the states and events.
 
     Args:
         server: server to view.
@@ -225,11 +235,14 @@ class ServerView:
         self._server.start()
 
     def boot(self, node_id: int) -> None:
-        """Set up a node again, even a refused node. The node gets a new proxy."""
+        """Set up a node again, even if it was refused before. The node gets a new proxy."""
         self._node(node_id).boot(self._server.now_us)
 
     def restart(self, node_id: int) -> None:
-        """Reset a node by NMT, even a lost node. A node that was Active becomes Active again."""
+        """Reset a node by NMT, even if it is lost.
+
+        If the node was Active, it becomes Active again.
+        """
         self._node(node_id).restart(self._server.now_us)
 
     def connect(self, first: str, second: str, properties: Mapping[str, str] | None = None) -> None:
@@ -237,16 +250,29 @@ class ServerView:
         self._server.manager.connect(first, second, properties)
 
     def disconnect(self, first: str, second: str) -> None:
-        """End a made or waiting connection through the PC. Raise RtcRefused if there is none."""
+        """End the connection of two ports through the PC, or cancel it if it waits for a port.
+
+        Raise RtcRefused if there is no such connection.
+        """
         if not self._server.connections.forget(first, second):
             self._server.manager.disconnect(first, second)
 
     def link(self, source: PdoName, target: PdoName) -> None:
-        """Make an RPDO receive a TPDO without the PC. Raise ServerRefused if they do not fit."""
+        """Link two nodes, so that the RPDO of one node directly receives the TPDO of the other.
+
+        Raise ServerRefused if the PDOs do not fit.
+
+        Args:
+            source: TPDO of the sending node.
+            target: RPDO of the receiving node.
+        """
         self._server.links.add(self._server.now_us, PdoLink(source, target))
 
     def unlink(self, source: PdoName, target: PdoName) -> None:
-        """End the link between a TPDO and an RPDO. Raise ServerRefused if there is none."""
+        """End the direct link between a TPDO and an RPDO of two nodes.
+
+        Raise ServerRefused if there is no such link.
+        """
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
     def read(self, node_id: int, index: int, sub: int) -> PendingTransfer[bytes]:
@@ -258,7 +284,10 @@ class ServerView:
         return self._transfer(node_id, download(index, sub, data), b"")
 
     def read_pdos(self, node_id: int) -> PendingTransfer[pdo_edit.Pdos]:
-        """Read all PDOs of a device. Raise ServerRefused if the device does not answer now."""
+        """Start reading all PDOs of a device. The result appears in the returned transfer.
+
+        Raise ServerRefused if the device does not answer now.
+        """
         node = self._node(node_id)
         pdo_edit.check_answers(node)
         return self._transfer(node_id, pdo_edit.read_pdos(node.file), {})
@@ -266,14 +295,14 @@ class ServerView:
     def write_pdos(
         self, node_id: int, before: pdo_edit.Pdos, wanted: pdo_edit.Pdos
     ) -> PendingTransfer[None]:
-        """Change PDOs of a device, and set up the device again.
+        """Start writing changed PDOs into a device. The device is then set up again.
 
         Raise ServerRefused if that is not possible now.
 
         Args:
             node_id: node-ID of the node.
             before: PDOs that the node has.
-            wanted: the new descriptions of some of these PDOs.
+            wanted: new descriptions of those PDOs that change.
         """
         node, transfer = self._node(node_id), PendingTransfer(None)
         linked = {link.target.index for link in self.links if link.target.node == node_id}
@@ -296,15 +325,24 @@ class ServerView:
         return transfer
 
     def read_parameters(self, node_id: int, eds: Path) -> PendingTransfer[Mapping[int, bytes]]:
-        """Read the DCF values of a device.
+        """Start reading from a device the values for its DCF.
+
+        The result appears in the returned transfer.
 
         Raise ServerRefused if the device does not answer now.
+
+        Args:
+            node_id: node-ID of the node.
+            eds: path of the node's EDS, which lists the values to read.
         """
         pdo_edit.check_answers(self._node(node_id))
         return self._transfer(node_id, pdo_edit.read_parameters(eds), {})
 
     def device_file(self, node_id: int) -> DeviceFile:
-        """Return the content of a node's EDS. Raise ServerRefused if there is no such node."""
+        """Return the data that the server has read from a node's EDS.
+
+        Raise ServerRefused if there is no such node.
+        """
         return self._node(node_id).file
 
     def definition(self) -> SystemDefinition:

@@ -34,13 +34,14 @@ _WIDE: Final = {"dataport.buffer.length": "64"}
 
 
 class MotionChain:
-    """The six components that control a cart, in one execution context in the order of data flow.
+    """The six components that drive a cart to goals, connected and in one execution context.
 
-    In another order they would also work, but data would be delayed by periods.
+    The components run in the order of the data flow, because another order would delay data by
+    whole periods.
 
     Args:
         manager: manager that runs the components.
-        open_link: function that opens the line to the base.
+        open_link: function that opens the serial line to the base of the cart.
         number: number at the end of each instance name, as in OpenRTM. Each cart has its own
             number.
         rate_hz: rate of the execution context.
@@ -48,7 +49,7 @@ class MotionChain:
     Attributes:
         manager: manager that runs the components.
         position_input: component at which goals are entered.
-        odometry: component that has the pose.
+        odometry: component that estimates the pose of the cart.
         components: all six components in the order of execution.
         context: execution context of the components.
     """
@@ -95,13 +96,13 @@ class MotionChain:
                 component.configuration.activate(set_id)
 
     def activate(self) -> None:
-        """Request Active of all components."""
+        """Request that all six components move to Active."""
         self.manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
-        """Request the move to Inactive of all Active components.
+        """Request that all Active components move to Inactive.
 
-        One on its way to Error refuses.
+        A component that is about to move to Error is not affected.
         """
         for component in self.components:
             self.context.deactivate_component(component)

@@ -24,7 +24,7 @@ _ETA: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class VelocityLimits:
-    """The limits for velocity commands.
+    """Largest velocities of a cart, and their largest changes from one command to the next.
 
     Attributes:
         v: maximum forward velocity in m/s.
@@ -61,15 +61,18 @@ class ControlLaw(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Regulator:
-    """A regulator that steers to a line: w' = -K3 (w - w_ff) - K2 q - K1 d.
+    """Control law that steers a cart along a line or a circle: w' = -K3 (w - w_ff) - K2 q - K1 d.
+
+    In the formula, w is the angular velocity, w_ff is the angular velocity that the circle needs (0
+    for a line), d is the distance from the line, and q is the deviation from its heading.
 
     Attributes:
-        k1: gain in rad/s2 per metre of distance d from the line.
-        k2: gain in rad/s2 per radian of deviation q from the heading of the line.
-        k3: gain in 1/s for the angular velocity.
-        most_offset: largest distance from the line that counts, in m.
+        k1: gain K1 in rad/s2 per metre of distance d.
+        k2: gain K2 in rad/s2 per radian of deviation q.
+        k3: gain K3 in 1/s for the angular velocity.
+        most_offset: limit in m to which a larger distance d is reduced.
         c1: reduction of the speed in m/s per rad/s of turning. The explicit law does not use `c1`.
-        step_s: time from one command to the next, used by the law.
+        step_s: time in s from one command to the next.
         law: integration method, implicit or explicit.
     """
 
@@ -88,7 +91,15 @@ class Regulator:
     def follow_circle(
         self, centre: Pose, radius: float, pose: Pose, v: float, before: Twist
     ) -> Twist:
-        """Return the command that steers round a circle, to the left for a positive radius."""
+        """Return the velocity command that keeps a cart on a circle.
+
+        Args:
+            centre: centre of the circle.
+            radius: radius in m, positive for a left turn and negative for a right turn.
+            pose: present pose of the cart.
+            v: wanted speed in m/s.
+            before: previous command.
+        """
         rho = hypot(pose.x - centre.x, pose.y - centre.y)
         phi = atan2(pose.y - centre.y, pose.x - centre.x)
         turn = copysign(1.0, radius)
@@ -109,7 +120,7 @@ class Regulator:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSpin:
-    """The control law for turning on the spot, as in the reference hardware.
+    """Control law for a cart that turns on the spot to a heading, as in the reference hardware.
 
     Attributes:
         alpha: angular acceleration in rad/s2.
@@ -118,7 +129,7 @@ class ReferenceSpin:
     alpha: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command towards a heading with a maximum speed."""
+        """Return the command that turns the cart to a heading, at `most` rad/s at most."""
         q = wrap(heading - present)
         wanted = max(sqrt(2 * _ETA * self.alpha * abs(q)), _FLOOR)
         return Twist(0.0, copysign(min(most, wanted), q))
@@ -126,14 +137,14 @@ class ReferenceSpin:
 
 @dataclass(frozen=True, slots=True)
 class TimeOptimalSpin:
-    """A control law for turning on the spot that brakes as late as possible.
+    """Control law for a cart that turns on the spot to a heading and brakes as late as possible.
 
-    The law uses the angle at the time at which the command takes effect.
+    The law uses the heading that is expected at the time at which the command takes effect.
 
     Attributes:
         alpha: angular acceleration in rad/s2.
-        step_s: time from one command to the next.
-        latency_s: time from a pose to the effect of the command for that pose.
+        step_s: time in s from one command to the next.
+        latency_s: time in s from the measurement of a heading to the effect of the command for it.
     """
 
     alpha: float
@@ -141,7 +152,7 @@ class TimeOptimalSpin:
     latency_s: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command towards a heading with a maximum speed."""
+        """Return the command that turns the cart to a heading, at `most` rad/s at most."""
         e = wrap(present + before.w * self.latency_s - heading)
         w = -copysign(min(most, sqrt(2 * self.alpha * abs(e))), e)
         if (e + self.latency_s * w) * e < 0:

@@ -67,7 +67,7 @@ def drive(
     watch: OnSample = lambda sample: None,
     timeout_us: int | None = None,
 ) -> MotionRun:
-    """Drive a cart to a goal, or along a path of several points.
+    """Drive a cart to a goal or along a path, and return the record of its motion.
 
     The drive ends half a second after the goal is reached, when a component is in Error, or at the
     time-out.
@@ -75,8 +75,9 @@ def drive(
     Args:
         connection: connection to the cart, with active components.
         points: points of the path. A single point is a goal.
-        watch: function that is called with each sample.
-        timeout_us: time limit. By default, it is three times the shortest time and half a minute.
+        watch: function that is called with each sample of the record.
+        timeout_us: time limit in us. By default, it is three times the shortest possible time plus
+            half a minute.
 
     Raises:
         ValueError: there is no point, or a number is invalid.
@@ -112,9 +113,13 @@ def _sample(connection: BaseConnection, time_s: float) -> TrackSample:
 
 
 def set_latency(chain: MotionChain, response_s: float) -> None:
-    """Set `latency` in the configuration set `tuned`, from the time constant of the base in s.
+    """Set the parameter `latency` of a cart's components in their configuration set `tuned`.
 
-    The latency is the time constant plus one and a half periods.
+    The latency is the time constant of the base, plus one and a half periods.
+
+    Args:
+        chain: components of the cart.
+        response_s: time constant of the base in s.
     """
     latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
     for component in (chain.navigation, chain.path_follower):

@@ -14,11 +14,14 @@ class Pose(NamedTuple):
     heading: float = 0.0
 
     def along(self, point: Pose) -> float:
-        """Return how far a point is ahead, measured along the line through this pose."""
+        """Return the distance of a point ahead of this pose, measured along its heading."""
         return (point.x - self.x) * cos(self.heading) + (point.y - self.y) * sin(self.heading)
 
     def left(self, point: Pose) -> float:
-        """Return how far a point is to the left of the line through this pose."""
+        """Return the distance of a point to the left of the line through this pose.
+
+        It is negative at the right.
+        """
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 
     def distance(self, point: Pose) -> float:
@@ -78,7 +81,13 @@ def wheel_speeds(
 
 
 def moved(pose: Pose, left_m: float, right_m: float, tread: float) -> Pose:
-    """Return the pose after the wheels have rolled two given lengths, on an exact arc.
+    """Return the pose of a cart after its wheels have rolled given distances, on an exact arc.
+
+    Args:
+        pose: pose before the motion.
+        left_m: distance of the left wheel in m.
+        right_m: distance of the right wheel in m.
+        tread: distance between the wheels in m.
 
     >>> moved(Pose(), 1.0, 1.0, 0.4)
     Pose(x=1.0, y=0.0, heading=0.0)

@@ -49,7 +49,7 @@ class _Adapter(RtComponent, Generic[S, T]):
 
 
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
-    """An adapter that converts moving commands of phase 1 for a robot of phase 2."""
+    """Component that converts velocity commands from phase 1 to phase 2 of the IIS interfaces."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
 
@@ -59,9 +59,9 @@ class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
 
 
 class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
-    """An adapter that converts moving commands of phase 2 for a robot of phase 1.
+    """Component that converts velocity commands from phase 2 to phase 1 of the IIS interfaces.
 
-    The robot has no sideways motion.
+    The sideways velocity is dropped, because phase 1 cannot represent it.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To1", "IIS velocity, phase 2 to 1")
@@ -72,7 +72,7 @@ class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
 
 
 class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
-    """An adapter that converts moving commands of phase 2 for a robot of phase 3."""
+    """Component that converts velocity commands from phase 2 to phase 3 of the IIS interfaces."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To3", "IIS velocity, phase 2 to 3")
 
@@ -83,7 +83,7 @@ class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
 
 
 class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
-    """An adapter that converts moving commands of phase 3 for a robot of phase 2."""
+    """Component that converts velocity commands from phase 3 to phase 2 of the IIS interfaces."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity3To2", "IIS velocity, phase 3 to 2")
 
@@ -94,12 +94,12 @@ class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
 
 
 class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
-    """An adapter that converts self-positions of phase 2 to phase 3."""
+    """Component that converts robot positions from phase 2 to phase 3 of the IIS interfaces."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
-        """Return the pose with its heading in 0..2 pi, or None if a number is invalid."""
+        """Return the position in phase 3, heading in 0..2 pi, or None if a number is invalid."""
         if not ports.plausible(value.x, value.y, value.theta):
             return None
         pose = Pose(value.x, value.y, positive(value.theta))
@@ -107,12 +107,12 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
 
 class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
-    """An adapter that converts self-positions of phase 3, or of RH3, to phase 2."""
+    """Component that converts positions of a robot, of IIS phase 3 or of RH3, to IIS phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
-        """Return the pose with its heading in 0..2 pi, or None if a number is invalid."""
+        """Return the position in phase 2, heading in 0..2 pi, or None if a number is invalid."""
         if (pose := ports.to_pose(value.data)) is None:
             return None
         numbers = (pose.x, pose.y, positive(pose.heading))
@@ -120,7 +120,7 @@ class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
 
 
 class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """An adapter that converts poses of RH3 for an IIS interface, with the heading in 0..2 pi."""
+    """Component that converts headings from -pi..pi (RH3) to 0..2 pi (IIS interfaces)."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositiveHeading", "Heading in 0..2 pi")
 
@@ -133,7 +133,7 @@ class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
 
 class WrappedHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
-    """An adapter that converts poses of an IIS interface for RH3, with the heading in -pi..pi."""
+    """Component that converts headings from 0..2 pi (IIS interfaces) to -pi..pi (RH3)."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("WrappedHeading", "Heading in -pi..pi")
 
@@ -157,10 +157,11 @@ _LOG: Final = log_of(__name__)
 
 
 class RunningInformation(RtComponent):
-    """A component that calculates velocities in the robot's frame from poses, one in each period.
+    """Component that calculates the velocity of a robot from its poses, and writes it each period.
 
-    If the latest pose is older than `timeout`, the velocity is 0. Use an execution context of 100
-    Hz or more. A slower context is logged. `tm` is the time of the later pose.
+    The velocity is in the frame of the robot, and its time `tm` is that of the later pose. If the
+    latest pose is older than `timeout`, the velocity is 0. Use an execution context of 100 Hz or
+    more. A slower context is logged.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")
@@ -212,13 +213,12 @@ class RunningInformation(RtComponent):
 
 
 class GoalInterface(RtComponent):
-    """A component that accepts goals by the IIS interface.
+    """Component that accepts goals in the form of the IIS interface, for the planner of RH3.
 
-    The first pose of a list is the goal. An empty list clears the goal.
-
-    A new goal replaces the old goal. A cleared goal becomes an empty path, so the cart stops on the
-    spot, as IIS recommends. A goal with an invalid number is ignored. Join `position` with
-    OmniTo2WD.goal and `min_path` with Navigation.min_path.
+    A goal is the first pose of a list, and an empty list clears the goal. A new goal replaces the
+    old one. A cleared goal becomes an empty path, so that the cart stops on the spot, as IIS
+    recommends. A goal with an invalid number is ignored. Connect `position` with OmniTo2WD.goal and
+    `min_path` with Navigation.min_path.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GoalInterface", "IIS goals for RH3")
@@ -315,7 +315,7 @@ class PathInterface(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Read the newest list, and check for a new pose which way points were passed."""
+        """Read a new path, check which way points were passed, and send the next command."""
         now = Time.from_us(ec.now_us)
         if (path := ports.read_newest(self.path)) is not None:
             self._take(now, path)

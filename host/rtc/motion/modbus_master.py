@@ -18,12 +18,12 @@ _CODES: Final = {code.value: code for code in modbus.ExceptionCode}
 
 @dataclass(frozen=True, slots=True)
 class ModbusAnswer:
-    """The answer of a Modbus slave.
+    """Answer of a Modbus slave to a request of `ModbusMaster`.
 
     Attributes:
         request: request that was answered.
         values: registers that were read.
-        refusal: reason why the slave refused the request, or None.
+        refusal: exception code with which the slave refused the request, or None.
     """
 
     request: modbus.Request
@@ -64,7 +64,9 @@ class ModbusMaster:
         self._tries = self._until_us = 0
 
     def begin(self, request: modbus.Request) -> None:
-        """Send a request. A request that is under way is dropped.
+        """Send a request without waiting for its answer, which `poll` returns later.
+
+        If an earlier request has no answer yet, that request is dropped.
 
         Raises:
             LinkClosed: the line is closed.
@@ -73,7 +75,9 @@ class ModbusMaster:
         self._send(request)
 
     def poll(self) -> ModbusAnswer | None:
-        """Return the answer if it has arrived. Repeat the request if the answer is overdue.
+        """Return the answer to the request if it has arrived, otherwise None. Call this repeatedly.
+
+        If the answer does not arrive in time, the request is sent again.
 
         Raises:
             LinkClosed: the line is closed.

@@ -19,10 +19,10 @@ _ROUNDING: Final = 1e-9
 
 
 class TrackSample(NamedTuple):
-    """The state of a cart in one period.
+    """State of a cart in one period of a recorded motion.
 
     Attributes:
-        time_s: time since the start of the run.
+        time_s: time since the start of the record in s.
         pose: pose of the cart.
         twist: commanded velocity.
         line: end of the line that the cart follows, or None while it turns or stands.
@@ -43,13 +43,13 @@ class _CrossTrack(NamedTuple):
 
 @dataclass(slots=True)
 class MotionRun:
-    """The record of a motion from a pose to a goal.
+    """Record of a cart's motion to a goal, with measures of its quality.
 
     Attributes:
-        goal: wanted end of the path.
-        samples: samples of the run, one for each period.
-        reached_s: time at which the components reported that the goal was reached, or None without
-            a report.
+        goal: pose at which the motion should end.
+        samples: states of the cart, one for each period.
+        reached_s: time in s at which the components reported that the goal was reached, or None if
+            they did not report it.
     """
 
     goal: Pose
@@ -113,7 +113,14 @@ def _violates(before: Twist, now: Twist, limits: VelocityLimits) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """The limits of a cart in m/s, rad/s, m/s2 and rad/s2, as in the default set."""
+    """Largest velocities and accelerations of a cart, as in the default configuration set.
+
+    Attributes:
+        v: maximum forward velocity in m/s.
+        w: maximum angular velocity in rad/s.
+        acceleration: maximum acceleration in m/s2.
+        angular_acceleration: maximum angular acceleration in rad/s2.
+    """
 
     v: float = 0.3
     w: float = 0.3
@@ -160,12 +167,15 @@ _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 class TrackMap:
-    """A text map of goals and a cart's track, on the largest scale that fits.
+    """Map drawn with text characters that shows the goals and the track of a cart.
 
-    On the map, x is to the right, and y is up.
+    The scale is the largest one at which all points fit. The x axis points to the right, and the y
+    axis points up.
 
     Args:
         points: points that the map must contain.
+        width: width of the map in characters.
+        height: height of the map in lines.
 
     >>> track = TrackMap([Pose(), Pose(2.0, 1.0)], width=6, height=2)
     >>> for n in range(21):
@@ -208,11 +218,13 @@ class TrackMap:
 
 
 class LiveMap:
-    """A map that is drawn again while samples arrive, with a line of numbers below.
+    """Map of a moving cart on a terminal, which is drawn again at regular intervals of samples.
+
+    A line below the map shows time, pose and velocity.
 
     Args:
         track: map that is drawn.
-        paint: function that writes text. The text may contain cursor movements of a terminal.
+        paint: function that writes text to the terminal. The text may contain cursor movements.
     """
 
     def __init__(self, track: TrackMap, paint: Callable[[str], None]) -> None:

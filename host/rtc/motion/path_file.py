@@ -20,7 +20,10 @@ def within_reach(goal: Pose) -> bool:
 
 
 def read_path(path: Path) -> list[Pose]:
-    """Return the points of a file. `#` begins a comment, and commas count as spaces.
+    """Read the points of a path from a text file, one point per line.
+
+    A line has x and y in metres, and optionally the heading in radians. `#` begins a comment, and
+    commas count as spaces.
 
     Raises:
         ValueError: the file cannot be read, a line is not a point (the message has the line), or
@@ -53,15 +56,15 @@ def parse_points(text: str) -> list[Pose]:
 
 
 def in_degrees(numbers: Sequence[float], text: str) -> Pose:
-    """Return the pose of two or three numbers in metres, metres and degrees.
+    """Return the pose of two or three typed numbers: x and y in metres, heading in degrees.
 
     Args:
-        numbers: numbers as text.
-        text: text of the numbers, used in messages.
+        numbers: two or three numbers. Without a third number, the heading is 0.
+        text: text of the numbers, for messages.
 
     Raises:
-        ValueError: there are not two or three numbers, a number is invalid, or the pose is beyond
-            `FARTHEST_M`.
+        ValueError: there are not two or three numbers, a number is invalid, or the pose is farther
+            away than `FARTHEST_M`.
     """
     if len(numbers) not in (2, 3) or not plausible(*numbers):
         raise ValueError(f"{text!r} is not X Y in metres, and a heading in degrees")

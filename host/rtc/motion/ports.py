@@ -66,16 +66,16 @@ def plausible(*numbers: float) -> bool:
 
 
 def to_pose(data: Pose2D) -> Pose | None:
-    """Convert a pose of a port, with the heading in -pi..pi.
+    """Convert a pose from a port to a `Pose`, with its heading in -pi..pi.
 
-    Return None unless it is `plausible`.
+    The result is None if a number is not `plausible`.
     """
     x, y, heading = data.position.x, data.position.y, data.heading
     return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
 
 
 def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
-    """Return the latest pose, or None without a pose, or if a number is not `plausible`."""
+    """Return the latest pose at a port, or None without a new pose that is `plausible`."""
     latest = read_newest(port)
     return None if latest is None else to_pose(latest.data)
 
@@ -83,7 +83,15 @@ def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
 def write_velocity(
     port: OutPort[iis.TimedVelocity2D], ec: ExecutionContext, vx: float, vy: float, va: float
 ) -> None:
-    """Write a velocity with the present time: m/s ahead, m/s to the left, rad/s to the left."""
+    """Write a velocity to a port, with the present time.
+
+    Args:
+        port: port to write to.
+        ec: execution context that has the time.
+        vx: forward velocity in m/s.
+        vy: velocity to the left in m/s.
+        va: angular velocity in rad/s, positive to the left.
+    """
     port.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=Velocity2D(vx, vy, va)))
 
 

@@ -22,11 +22,11 @@ Error = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Umbmark:
-    """The result of a UMBmark test: the errors of a cart's odometry after driving squares.
+    """Result of a UMBmark test, which measures the errors of a cart's odometry by driving squares.
 
     Attributes:
-        clockwise: error of each run in clockwise direction.
-        counter_clockwise: error of each run in counter-clockwise direction.
+        clockwise: error in m (x, y) of each run in clockwise direction.
+        counter_clockwise: error in m (x, y) of each run in counter-clockwise direction.
         returns_m: distance of the cart from its start at the end of each run.
     """
 
@@ -36,7 +36,11 @@ class Umbmark:
 
     @property
     def most_m(self) -> float:
-        """E_max,syst: the larger of the distances of the two centres of gravity from the origin."""
+        """The systematic error of the odometry in m (E_max,syst).
+
+        It is the mean error of the runs in one direction, as a distance from the origin, for the
+        direction with the larger error.
+        """
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 
     def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
@@ -76,14 +80,14 @@ def run_umbmark(
     side_m: float = SIDE_M,
     watch: OnSample = lambda sample: None,
 ) -> Umbmark:
-    """Drive squares in both directions, each from the origin.
+    """Run a UMBmark test: drive squares in both directions, and return the errors of the odometry.
 
     Args:
         begin: function that starts run number n, from 0 on, with a cart at the origin and active
             components.
         true_pose: function that measures the position of the cart at the end of a run.
         runs: number of runs in each direction.
-        side_m: side length of the squares. UMBmark has 4 m.
+        side_m: side length of the squares in m. UMBmark has 4 m.
         watch: function that is called with each sample.
 
     Raises:

@@ -54,7 +54,7 @@ class PeerThread:
         retry_us: time in us after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: same time in seconds.
+        retry_s: time `retry_us` in seconds.
     """
 
     def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
@@ -138,7 +138,7 @@ class PeerThreads:
         retry_us: time in us after which connectors repeat a call that had no answer.
 
     Attributes:
-        retry_s: same time in seconds.
+        retry_s: time `retry_us` in seconds.
         running: number of running threads.
     """
 

@@ -25,7 +25,10 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 
 def build(project: Project) -> dict[str, str]:
-    """Generate all files of a project. Return the text of each file by file name.
+    """Generate all files for a DeviceRTC, such as its EDS and the skeleton of its component.
+
+    Returns:
+        The text of each file, by file name.
 
     Raises:
         ValueError: a name is not allowed in Python or C.
@@ -130,14 +133,17 @@ def _pdo(port: rtc_canopen.PlacedPort) -> str:
 def run_builder(
     path: Path, out: Path | None, warn: Callable[[str], None], *, force: bool, every: bool
 ) -> Iterator[str]:
-    """Check a profile and write its files. Yield the lines that describe the profile.
+    """Check the profile of a DeviceRTC and write the files made from it.
 
     Args:
         path: path of the profile.
         out: folder for the files, or None to write no files.
-        warn: function that is called with a line about each file that is kept.
+        warn: function that is called with a line about each existing file that is not overwritten.
         force: whether to overwrite an existing skeleton.
         every: whether to show every object, and not only objects of ports.
+
+    Yields:
+        Lines that describe the profile to the user.
     """
     project, files = _read_and_build(path)
     if out is not None:

@@ -49,10 +49,9 @@ _IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport"
 
 
 def python_name(name: str) -> str:
-    """Turn a name into an attribute name of a component. An underscore avoids taken names.
+    """Turn the name of a port or object into a Python attribute name of the generated component.
 
-    >>> python_name("in"), python_name("target_um")
-    ('in_', 'target_um')
+    If the name is reserved or used by the component itself, an underscore is appended.
     """
     taken = keyword.iskeyword(name) or name in COMPONENT_NAMES | _IMPORTED or name.isupper()
     return f"{name}_" if taken else name
@@ -64,11 +63,7 @@ def c_name(name: str) -> str:
 
 
 def snake_name(name: str) -> str:
-    """Turn a name into lower case with underscores, as in names of files and constants.
-
-    >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
-    ('unsigned_long_long', 'gripper2')
-    """
+    """Turn a name into lower case with underscores, for names of files and constants."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
@@ -100,10 +95,10 @@ _DEFAULT_NODE_ID: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """The content of a profile file, from which the builder makes a component.
+    """Content of the profile file of a DeviceRTC, from which the builder generates its files.
 
     Attributes:
-        profile: the component with its ports.
+        profile: component with its ports.
         node_id: node-ID in the System Definition.
         strict_cia301: whether NMT commands lead out of Error, as in CiA 301 (DECISION K9).
     """
@@ -114,10 +109,10 @@ class Project:
 
 
 def parse_project(text: str) -> Project:
-    """Read a profile.
+    """Parse the text of a profile file of a DeviceRTC.
 
     Raises:
-        ValueError: the file is not TOML, a key is unknown, a value has the wrong type, or no
+        _ProfileError: the file is not TOML, a key is unknown, a value has the wrong type, or no
             DeviceRTC can have this profile.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none

@@ -19,14 +19,14 @@ from tickrig.wire.can import ErrorState
 def run_editor(
     file: Path, log: Path | None, components: Sequence[str], start: bool, bus_options: BusOptions
 ) -> None:
-    """Serve a System Definition and edit it on the terminal.
+    """Run a server for a System Definition, and show the terminal editor for it.
 
     Args:
         file: path of the System Definition.
         log: file to which events are written, with one line of JSON per event.
         components: components in files of the user, such as `Logger0=parts.py:Logger`.
         start: whether to activate all nodes.
-        bus_options: options of the bus on the command line.
+        bus_options: options of the command line that select the bus.
     """
     if log == opening.STANDARD_OUTPUT:
         raise Refused("--log -: the screen is on standard output; name a file")

@@ -45,7 +45,7 @@ _NOT_HERE: Final = ("create", "delete", "save")
 
 
 class ServerControl(SystemControl):
-    """The control of one server. It answers requests about the server's system and its nodes.
+    """Answers the requests to the control socket of a CANopen server and its nodes.
 
     Args:
         server: server to control. The server must not tick during a request.
@@ -94,10 +94,14 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
-    """Make a server for a System Definition, with the components in files of the user.
+    """Create the server for a System Definition, with the additional components of the user.
 
-    The function raises Refused if the definition or a component is not usable. Findings in EDS
-    files that do not prevent use are printed to standard error.
+    Raise Refused if the definition or a component cannot be used. Mistakes in EDS files that do not
+    prevent their use are printed to standard error.
+
+    Args:
+        file: path of the System Definition.
+        components: components in the form `Logger0=parts.py:Logger`.
     """
     try:
         server = open_server(file)
@@ -111,7 +115,7 @@ def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
 
 
 def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
-    """Add components in files of the user to a server.
+    """Add components that are defined in Python files of the user to a server.
 
     Args:
         server: server that gets the components. The components run at the rate of the server's
@@ -137,11 +141,11 @@ def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
 def open_link(
     options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
 ) -> tuple[StampedLink, str]:
-    """Open the bus of a server. Return the link to the bus, and the name of the bus.
+    """Open the CAN bus for a server. Return the link to the bus, and the name of the bus.
 
     Args:
-        options: the options that select the bus.
-        bus_state: function that is called with each report of the CAN controller.
+        options: options that select the bus.
+        bus_state: function that is called with each state report of the CAN controller.
         stack: exit stack that closes the bus.
     """
     bus, interface, channel = open_raw(options)
@@ -153,7 +157,7 @@ def open_link(
 
 
 def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
-    """Return the bus given on the command line. If none is given, return the bus of the file."""
+    """Return the bus that the command line selects, or else the bus of the System Definition."""
     if options or entry.channel is None:
         return options
     return replace(
@@ -165,7 +169,7 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield a function that writes events to the log file, or nothing without a log file."""
+    """Yield one function that writes server events to the log file, or none without a file."""
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
     elif log is not None:
@@ -191,12 +195,12 @@ _QUICK_US: Final = 2_000
 
 
 def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
-    """Serve a System Definition. With some options, only check or draw the definition.
+    """Run a server for a System Definition. Some options only check or draw the definition instead.
 
     Args:
         file: path of the System Definition.
-        span_us: time to serve the definition in us, or `NEVER` for no end.
-        engines: engines to join.
+        span_us: duration of the run in us, or `NEVER` for no end.
+        engines: engines, such as OpenRTM, that connect the system with other systems.
         options: other options of the command line.
     """
     server = read_server(file, options.pop("components"))

@@ -92,11 +92,11 @@ _ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
 
 
 class SystemEditor(FramedApp):
-    """Editor that shows a server and controls it by keys and mouse.
+    """Terminal editor that shows a running CANopen server and controls it by keys and mouse.
 
     Args:
         session: session with the server. The caller of the app starts the session.
-        bus: name of the bus.
+        bus: name of the bus, for display.
     """
 
     TITLE = "RTC-CANopen System Editor"
@@ -149,7 +149,7 @@ class SystemEditor(FramedApp):
         self.set_interval(PAINT_S, self.look)
 
     def run_session(self) -> None:
-        """Run the server in a thread, and show it until the user leaves the editor.
+        """Run the server in a thread, and show the editor until the user leaves it.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -165,7 +165,10 @@ class SystemEditor(FramedApp):
                 self.session.close()
 
     def look(self) -> None:
-        """Show the present state. The app calls this ten times a second, and after each command."""
+        """Update the editor with the present state of the server.
+
+        The app calls this method ten times a second, and after each command.
+        """
         if self.session.ended:
             self.exit()
             return
@@ -242,7 +245,7 @@ class SystemEditor(FramedApp):
             self.look()
 
     def action_remove(self) -> None:
-        """End the link or connection under the cursor.
+        """End the PDO link or the connection in the row under the cursor.
 
         In the picture, end one link or connection of the port under the cursor.
         """

@@ -69,11 +69,11 @@ class _NodeObjects:
         return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= _FIRST_INDEX]
 
     def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
-        """Process results of SDO requests, and request missing values.
+        """Process the results of SDO requests, and request missing values of visible objects.
 
         Args:
             view: view that sends commands to the server.
-            seen: the visible objects.
+            seen: visible objects.
             answers: whether the node answers SDO requests.
         """
         self._take_written()
@@ -95,7 +95,7 @@ class _NodeObjects:
         self._wanted.append(entry)
 
     def write(self, view: ServerView, entry: Entry, words: str) -> None:
-        """Write an object, and read it afterwards.
+        """Write a value typed by the user to an object, and read the object afterwards.
 
         Raises:
             ValueError: the value does not fit the type of the object.
@@ -205,7 +205,7 @@ def _words_of(text: ObjectText, data: bytes) -> str:
 
 
 class ObjectsPane(CursorView[Entry]):
-    """A pane that shows the objects of one node at a time.
+    """Pane of the CANopen editor that shows the object dictionary of one node at a time.
 
     Attributes:
         objects: objects of the node, or None if no node is shown.
@@ -231,7 +231,14 @@ class ObjectsPane(CursorView[Entry]):
         self._of: dict[int, _NodeObjects] = {}
 
     def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
-        """Show the objects of a node, or none for node-ID 0. The EDS is read the first time."""
+        """Show the objects of a node, or no objects for node-ID 0.
+
+        The EDS of the node is read at the first call.
+
+        Args:
+            node_id: node-ID of the node, or 0.
+            eds: paths of the EDS files by node-ID.
+        """
         if node_id and node_id not in self._of:
             self._of[node_id] = _read(node_id, eds[node_id])
         self.objects = self._of.get(node_id)

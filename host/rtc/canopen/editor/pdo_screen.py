@@ -96,7 +96,9 @@ def _pdo_line(
 
 
 class PdoScreen(ModalScreen[None]):
-    """A screen to edit the PDOs of a node. Changes stay on the screen until they are written.
+    """Screen of the CANopen editor on which the user changes the PDOs of a node.
+
+    The changes are sent to the node only when the user writes them.
 
     Args:
         session: session with the server.
@@ -104,7 +106,7 @@ class PdoScreen(ModalScreen[None]):
 
     Attributes:
         pdos: PDOs that the node has, empty before they were read.
-        wanted: PDOs that were changed and are not written yet.
+        wanted: PDOs that the user has changed and not written yet.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -156,7 +158,10 @@ class PdoScreen(ModalScreen[None]):
     # The display, and the results of transfers.
 
     def look(self) -> None:
-        """Show the present state. The app calls this ten times a second, and after each command."""
+        """Update the screen with the present state of the node.
+
+        The app calls this method ten times a second, and after each command.
+        """
         if not self.is_mounted:
             return
         with self._session.lock:
@@ -238,7 +243,10 @@ class PdoScreen(ModalScreen[None]):
             self._command(self._begin_reading)
 
     def action_insert(self) -> None:
-        """Ask for an object, and insert it after the entry under the cursor, or last in the PDO."""
+        """Ask the user for an object, and map it into the PDO after the entry under the cursor.
+
+        If the cursor is on the PDO itself, the object becomes the last entry.
+        """
         if (at := self._at()) is not None:
             pdo = self.wanted.get(at.index, self.pdos[at.index])
             place = len(pdo.mapping) if at.entry < 0 else at.entry + 1
@@ -308,7 +316,10 @@ class PdoScreen(ModalScreen[None]):
         self._command(write)
 
     def action_link(self) -> None:
-        """Remove the links of the PDO under the cursor, or ask which PDO to link with it."""
+        """Remove the links of the PDO under the cursor.
+
+        If it has none, ask which PDO to link with it.
+        """
         if (at := self._at()) is None:
             return
         if self.wanted:

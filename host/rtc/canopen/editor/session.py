@@ -24,11 +24,10 @@ AddComponents = Callable[[RtcCanopenServer], None]
 
 
 class EditorSession:
-    """A session that runs a server in a thread, and can change to another System Definition.
+    """Runs a CANopen server in a thread while a user interface shows it.
 
-    Each definition gets a new server.
-
-    Hold `lock` to access the server.
+    The session can change to another System Definition, for which it makes a new server. Hold
+    `lock` while you access the server.
 
     Args:
         server: server to run.
@@ -40,7 +39,7 @@ class EditorSession:
     Attributes:
         lock: lock that protects the server.
         path: file from which the System Definition was last read, or to which it was saved.
-        server: running server.
+        server: server that runs at present.
     """
 
     def __init__(
@@ -76,7 +75,9 @@ class EditorSession:
         return {node.id: self._folder / node.eds for node in nodes}
 
     def load(self, path: Path) -> None:
-        """Serve another definition, after leaving the nodes of the present definition.
+        """Change to the System Definition in another file, for which a new server is made.
+
+        The old server ends and leaves its nodes as its definition requires.
 
         Raises:
             DefinitionError: the definition or an EDS cannot be used.
@@ -104,7 +105,11 @@ class EditorSession:
         self.server.bus_state(state)
 
     def turn(self, until_us: int) -> None:
-        """Wait for frames or the next due time, at most until `until_us`. Then tick the server."""
+        """Wait until the server has work to do, then tick the server and send its frames.
+
+        Args:
+            until_us: time in us at which the wait ends at the latest.
+        """
         link = self._link
         due_us = min(self.server.due_us, until_us)
         now_us, received = link.receive_stamped(max(0, due_us - link.now_us))

@@ -178,7 +178,10 @@ def joints(system: SystemView, port: PortView) -> list[PdoLink | RtConnection]:
 
 
 def connect(view: ServerView, first: Item, second: Item) -> None:
-    """Connect two ports through the PC. Raise ServerRefused or RtcRefused if they do not fit."""
+    """Connect two ports with each other through the PC, in any order.
+
+    Raise ServerRefused or RtcRefused if the ports do not fit.
+    """
     if not (isinstance(first, PortView) and isinstance(second, PortView)):
         raise ServerRefused("through the PC go ports: mark one, go to another")
     out, in_ = (first, second) if first.out else (second, first)
@@ -186,7 +189,10 @@ def connect(view: ServerView, first: Item, second: Item) -> None:
 
 
 def link(view: ServerView, first: Item, second: Item) -> None:
-    """Link a TPDO with an RPDO without the PC. Raise ServerRefused if they do not fit."""
+    """Link a TPDO of a node directly with an RPDO of another node, in any order.
+
+    Raise ServerRefused if the PDOs do not fit.
+    """
     ends = [
         one.pdo if isinstance(one, PortView) else one.name
         for one in (first, second)
@@ -213,11 +219,13 @@ def remove(view: ServerView, item: Item) -> None:
 
 
 class SystemPane(CursorView[Item]):
-    """A pane that shows a system. Commands apply to the row under the cursor.
+    """Pane of the CANopen editor that lists the nodes of a system with their ports, PDOs and links.
+
+    Commands apply to the row under the cursor.
 
     Attributes:
         folded: keys of rows whose sub-rows are hidden.
-        marked: port or PDO that is to be connected.
+        marked: port or PDO that the user marked for a connection.
         node_id: node whose rows contained the cursor last, or 0 for no node.
     """
 
@@ -272,9 +280,9 @@ class SystemPane(CursorView[Item]):
                 return
 
     def mark(self) -> bool:
-        """Mark the port or PDO under the cursor, or remove the mark.
+        """Mark the port or PDO under the cursor for a connection, or remove its mark.
 
-        Return False for other rows.
+        Return False if the row under the cursor is neither a port nor a PDO.
         """
         row = self.row
         if row is None or not isinstance(row.item, PdoView | PortView):

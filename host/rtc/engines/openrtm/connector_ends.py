@@ -430,10 +430,9 @@ class ServiceEnd(ConnectorEnd):
         self._port = port
 
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve the interfaces that the local port provides. Return properties with their references.
+        """Serve the interfaces of the local port, and return the properties that refer to them.
 
-        Each interface has two properties, with its name for OpenRTM 1.0 and its name for later
-        versions.
+        Each interface has two properties, so that OpenRTM 1.0 and later versions find it.
         """
         found: dict[str, str] = {}
         for provider in self._port.providers:

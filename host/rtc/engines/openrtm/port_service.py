@@ -154,7 +154,7 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connection with an ID, and record that its peer need not be notified of the end.
+        """Return the connection with an ID. Its peer is then not notified of the end.
 
         This is called when the peer or a tool requests the end of the connector.
 
@@ -278,7 +278,7 @@ class _PortAnswers:
         return stubs().rtc.ConnectorProfile("", "", [], [])
 
     def connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Connect the ports that a connector profile lists. Return the result and the new profile.
+        """Connect the ports in a connector profile. Return the result and the profile.
 
         A missing ID and missing byte orders are filled in. The first port of the list then
         connects.
@@ -296,7 +296,7 @@ class _PortAnswers:
         return answer
 
     def notify_connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Connect the local port as a profile describes, and request the same from the next port."""
+        """Connect the local port as a profile describes, and make the next port do the same."""
         code, values = _OK, connector_ends.texts(profile.properties)
         try:
             name = _peer_name(profile, self._port.full_name)

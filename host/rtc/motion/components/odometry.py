@@ -17,11 +17,11 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 
 
 class Odometry(RtComponent):
-    """A component that computes the pose of the middle of the drive axle from the wheel angles.
+    """Component that estimates the pose of a cart (middle of the drive axle) from wheel angles.
 
     The motion is integrated on exact arcs. The port LocalizedPosition exists and is unused, as in
-    the specification. A message is ignored if its angles are not numbers, or if it has fewer angles
-    than there are ids of wheels.
+    the specification. A message is ignored if its angles are not numbers, or if it has too few
+    angles for the configured wheel IDs.
 
     Attributes:
         pose: estimated pose of the cart.
@@ -51,7 +51,7 @@ class Odometry(RtComponent):
         self._before: tuple[float, float] | None = None
 
     def load(self, path: Path) -> None:
-        """Replace values in the configuration sets by values of a file such as Odometry.conf.
+        """Set parameters in the configuration sets to the values of a file such as Odometry.conf.
 
         Raises:
             OSError: the file cannot be read.
@@ -62,7 +62,11 @@ class Odometry(RtComponent):
             self.configuration.add_set(set_id, {**held, **values})
 
     def calibrate(self, wheels: Wheels) -> None:
-        """Set wheel radii and axle length. Raise RtcRefused if a length is not above 0."""
+        """Set the wheel radii and the axle length in the active configuration set.
+
+        Raises:
+            RtcRefused: a length is not above 0.
+        """
         for parameter, value in zip(self._geometry, wheels, strict=True):
             self.configuration.set(parameter.name, repr(value))
 
@@ -104,9 +108,12 @@ class Odometry(RtComponent):
 
 
 def read_conf(path: Path) -> dict[str, dict[str, str]]:
-    """Return the values of each configuration set of a file: `conf.default.lengthOfAxle: 0.464`.
+    """Read configuration sets from a file with lines like `conf.default.lengthOfAxle: 0.464`.
 
     Other lines are settings of OpenRTM and are ignored.
+
+    Returns:
+        The values as text, by the name of their parameter, for each configuration set.
 
     Raises:
         OSError: the file cannot be read.

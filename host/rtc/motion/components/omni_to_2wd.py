@@ -20,11 +20,11 @@ _LOG: Final = log_of(__name__)
 
 
 class OmniTo2WD(RtComponent):
-    """A planner of turns and straight lines, for a cart that cannot go sideways.
+    """Component that plans turns and straight lines for a cart that cannot move sideways.
 
     The cart never goes backward. A step of zero length is left out. A goal or a path with an
-    invalid number is ignored, and a line is logged. FINISH is written only once, when the goal is
-    reached, so that the end of an earlier command is not taken for the end of a later command.
+    invalid number is ignored, and a line is logged. The status FINISH is written only once, when
+    the goal is reached, so that it cannot be mistaken for the end of a later command.
 
     Attributes:
         refused: number of ignored goals and paths.
@@ -98,14 +98,11 @@ class OmniTo2WD(RtComponent):
 
 
 def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
-    """Return the turns and straight lines of a path (RH3 specification, path calculation).
+    """Plan a path as turns on the spot and straight lines, and return the poses between them.
 
-    The list begins with the start. For each point, it has two poses: the previous place with the
-    heading to the point, and the point with that heading. The list ends with the last point in its
-    wanted heading.
-
-    >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]
-    [(0.0, 0.0, 0.0), (0.0, 0.0, 1.57), (0.0, 2.0, 1.57), (0.0, 2.0, 0.0)]
+    The list begins with the start. For each point of the path, it has two poses: the previous
+    position with the heading towards the point, and the point with that heading. The list ends with
+    the last point in its wanted heading (RH3 specification, path calculation).
     """
     way, here = [start], start
     for point in points:

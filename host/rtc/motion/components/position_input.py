@@ -66,7 +66,7 @@ class PositionInput(RtComponent):
         return not (self._commands or self._running)
 
     def goal(self, pose: Pose) -> None:
-        """Enter a goal. The goal runs after the earlier commands.
+        """Enter a goal, to which the cart drives after the earlier commands have finished.
 
         Raises:
             ValueError: a number is invalid.
@@ -74,7 +74,7 @@ class PositionInput(RtComponent):
         self._commands.append((_point(pose),))
 
     def path(self, poses: Sequence[Pose]) -> None:
-        """Enter a path of two points or more.
+        """Enter a path of two points or more, which the cart follows after the earlier commands.
 
         Raises:
             ValueError: there are fewer than two points, or a number is invalid.
@@ -82,11 +82,10 @@ class PositionInput(RtComponent):
         self._commands.append(_points(poses))
 
     def replace(self, *poses: Pose) -> None:
-        """Enter a goal or a path in place of the running and waiting commands.
+        """Enter a goal (one pose) or a path (several) in place of all running and waiting commands.
 
         Raises:
-            ValueError: there is no point, or a number is invalid. The running command then
-                continues.
+            ValueError: there is no pose, or a number is invalid. The earlier commands then remain.
         """
         command = (_point(*poses),) if len(poses) == 1 else _points(poses)
         self._commands.clear()
@@ -94,11 +93,13 @@ class PositionInput(RtComponent):
         self._commands.append(command)
 
     def typed(self, line: str) -> None:
-        """Enter a command as text; see `USAGE`. The command runs after the earlier commands.
+        """Enter a command that the user typed, such as `goal 1 0 90`; see `USAGE`.
+
+        The command is executed after the earlier commands.
 
         Raises:
             ValueError: the command is unknown, a pose or path is invalid, a file cannot be read, or
-                `end` was typed before. The commands do not change then.
+                `end` was typed before. No command is added in this case.
         """
         self.require_open()
         word, _, rest = line.strip().partition(" ")
@@ -121,7 +122,7 @@ class PositionInput(RtComponent):
             raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
 
     def end(self) -> None:
-        """Move to Error when all commands have finished, as the original does at its end."""
+        """Move to Error once all commands have finished, as the original does at its end."""
         self._ending = True
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:

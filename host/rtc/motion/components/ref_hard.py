@@ -148,7 +148,7 @@ class RefHardRh3(RtComponent):
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and write settings and power. A fault of the base is cleared."""
+        """Open the line to the base, clear its fault, write its settings, and switch it on."""
         self._forget()
         self.velocity.clear()
         if not all(constant.value for constant in self.constants):

@@ -12,13 +12,13 @@ from tickrig.wire.rtc_types import iis
 
 
 class Follower(RtComponent):
-    """A component that keeps a distance to the robot whose self-position arrives at `leader`.
+    """Component that makes a robot follow another robot (the leader) at a distance.
 
-    Both positions are in one map frame. If the leader is nearer than `gap`, the robot stands. The
-    robot never goes back. A base on two wheels turns to the leader and goes. With `sideways`, the
-    robot goes straight to its wanted position and takes over the leader's heading. If either
-    position is missing for `pose_timeout`, the robot stands. Which robot leads depends on the
-    connector.
+    The position of the leader arrives at the port `leader`. Both positions are in one map frame. If
+    the leader is nearer than `gap`, the robot stands. The robot never goes back. A base on two
+    wheels turns towards the leader and drives. With `sideways`, the robot drives straight to its
+    wanted position and turns to the heading of the leader. If either position is missing for
+    `pose_timeout`, the robot stands. The connector at `leader` decides which robot leads.
 
     The report gives no control law. This law, its gains and its limits are additions.
     """

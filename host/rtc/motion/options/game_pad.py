@@ -48,7 +48,7 @@ _HOLD_US: Final = 300_000
 
 
 class KeyboardPad:
-    """A pad of terminal keys: w s forward and back, a d turn, q e sideways, space stop.
+    """Game pad simulated by terminal keys: w s forward/back, a d turn, q e sideways, space stop.
 
     Args:
         fd: file descriptor of the terminal. By default, it is standard input.
@@ -85,10 +85,11 @@ def open_pad(name: str) -> _GamePadDevice:
 
 
 class GamePad(DeviceComponent[_GamePadDevice]):
-    """A component that writes the velocity of a game pad in each period while a stick is deflected.
+    """Component that writes the velocity that the user requests by a game pad.
 
-    After the release of the stick, it writes 0 once. The specification has only the name of the
-    component. Ports and parameters are additions.
+    It writes the velocity in each period while a stick is deflected, and 0 once after the release
+    of the stick. The specification has only the name of the component. Ports and parameters are
+    additions.
 
     Args:
         instance_name: name of the component.

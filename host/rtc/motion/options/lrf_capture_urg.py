@@ -14,9 +14,9 @@ from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
 
 class LrfCaptureUrg(DeviceComponent[UrgClient]):
-    """A component that runs a laser scanner while the component is Active, and writes each scan.
+    """Component that runs a URG laser scanner while Active, and writes each scan to a port.
 
-    A range of 0 means that there was no distance. The specification has only the name of the
+    A range of 0 means that no distance was measured. The specification has only the name of the
     component (LRFCapture_URG). Ports and parameters are additions.
 
     Args:

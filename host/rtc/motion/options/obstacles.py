@@ -35,10 +35,10 @@ _LOG: Final = log_of(__name__)
 
 
 class UrgToObstacles(RtComponent):
-    """A component that writes the positions of obstacles in the coordinates of the robot.
+    """Component that converts laser scans to obstacle positions in the coordinates of a robot.
 
-    x is ahead of the axle, and y is to the left. The specification has only the name of the
-    component (Urg_to_Obstacles). Ports and parameters are additions.
+    The x axis points ahead from the axle, and the y axis points to the left. The specification has
+    only the name of the component (Urg_to_Obstacles). Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Urg_to_Obstacles", "Points out of range data")
@@ -72,10 +72,11 @@ def _directions(first: float, step: float, count: int) -> Sequence[tuple[float, 
 
 
 class ObstacleMonitor(RtComponent):
-    """A component that measures the free distance in the lane straight ahead of the robot.
+    """Component that measures the distance to the nearest obstacle straight ahead of a robot.
 
-    `distance` is measured from the front of the robot. The value `range` means a free lane. The
-    specification has only the name of the component. Ports and parameters are additions.
+    It considers obstacles within `half_width` of the middle line. The port `distance` has the
+    distance from the front of the robot, or the value of the parameter `range` if the lane is free.
+    The specification has only the name of the component. Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstacleMonitor", "Distance to what is in the way")
@@ -139,13 +140,14 @@ class _WatchedDistance:
 
 
 class ObstaclesAvoidance(RtComponent):
-    """A component that stops the cart before obstacles. It is between PathFollower and the base.
+    """Component that stops a cart before obstacles. Connect it between PathFollower and the base.
 
-    The component plans no way around. Forward motion ends when an obstacle is nearer than
-    `stop_distance`, and continues when it is farther than `go_distance`. Both use `max_acc_v`.
-    Commands to turn on the spot and to go back always pass. Without a velocity for `timeout`, the
-    component writes nothing, so that the base's own watchdog acts. The specification has only the
-    name of the component. Ports and parameters are additions.
+    The component stops the cart, but does not plan a way around. Forward motion ends when an
+    obstacle is nearer than `stop_distance`, and continues when it is farther than `go_distance`.
+    The speed changes with the acceleration `max_acc_v`. Commands to turn on the spot and to go back
+    are not affected. Without a velocity for `timeout`, the component writes nothing, so that the
+    base's own watchdog acts. The specification has only the name of the component. Ports and
+    parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstaclesAvoidance", "Stop and go")
@@ -181,11 +183,11 @@ class ObstaclesAvoidance(RtComponent):
 
 
 class CollisionDetection(RtComponent):
-    """A component that calls Stop if an obstacle is nearer than `stop_distance`, and Go afterwards.
+    """Component that stops the base of a cart while an obstacle is nearer than `stop_distance`.
 
-    Go is called when the lane is free again. Without a distance for `timeout`, the component calls
-    Stop, because there may be an obstacle. When it is deactivated, it calls Go, if it had called
-    Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard. The specification has only the name of the
+    It calls Stop of the base, and Go when the lane is free again. Without a distance for `timeout`,
+    it calls Stop, because there may be an obstacle. When it is deactivated after Stop, it calls Go.
+    Connect `BumpRefHard` with RefHardRh3.BumpRefHard. The specification has only the name of the
     component. Ports and parameters are additions.
     """
 
@@ -233,13 +235,14 @@ _LATEST: Final = {"dataport.buffer.length": "8"}
 
 
 class CollisionGuard:
-    """The components between a range finder and the base, in the context of a chain.
+    """Adds components to a cart's motion chain that stop the cart before obstacles.
 
-    PathFollower is joined to ObstaclesAvoidance in place of RefHardRh3.
+    The components are between the range finder and the base. They run in the execution context of
+    the chain. PathFollower is connected with ObstaclesAvoidance instead of RefHardRh3.
 
     Args:
         manager: manager that runs the chain.
-        chain: chain of a cart.
+        chain: motion chain of the cart.
         open_urg: function that opens the line to the range finder of the cart.
 
     Attributes:

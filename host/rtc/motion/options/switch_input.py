@@ -14,12 +14,12 @@ _LOG: Final = log_of(__name__)
 
 
 class SwitchInput(RtComponent):
-    """A switch between the velocities of joystick and planner. The joystick has priority.
+    """Component that selects between the velocities of a joystick and of a planner.
 
-    When the joystick is released, the cart stands for the time `hold`. Then the planner resumes. A
-    deflected joystick without a message for `stale` counts as released. A velocity with an invalid
-    number counts as 0. The specification has only the name of the component (SwitchInputRTC). Ports
-    and parameters are additions.
+    The joystick has priority. When the joystick is released, the cart stands for the time `hold`,
+    and then follows the planner again. A deflected joystick without a message for `stale` counts as
+    released. A velocity with an invalid number counts as 0. The specification has only the name of
+    the component (SwitchInputRTC). Ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
