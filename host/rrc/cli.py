@@ -65,9 +65,9 @@ class _RrcGroup(HarmlessCommand, click.Group):
     command_class = _Verb
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, and accept options after URL too.
+        """Parse the command line of `rrc`, in which options may stand before or after the URL.
 
-        Accept no URL if a verb comes first, for the help of the verb.
+        If a verb comes first, no URL is needed, so that the help of the verb can be shown.
         """
         options, url, rest = self._split(ctx, args)
         if url in self.commands:

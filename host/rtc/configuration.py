@@ -36,7 +36,7 @@ _COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
 
 
 class Constraint:
-    """The values that a parameter may have, in OpenRTM's notation.
+    """Constraint on the values of a configuration parameter, in OpenRTM's notation.
 
     | notation | allows |
     |---|---|

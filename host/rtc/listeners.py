@@ -15,10 +15,10 @@ _LOG: Final = log_of(__name__)
 def call_listeners(
     who: str, listeners: Iterable[Callable[P, object]], *args: P.args, **kwargs: P.kwargs
 ) -> None:
-    """Call each listener. An exception in a listener is logged and has no other effect.
+    """Call each function of a list of listeners. An exception in a listener is only logged.
 
     Args:
-        who: owner of the listeners, used in messages.
+        who: owner of the listeners, for the log.
         listeners: functions that are called in their order. A listener may add or remove listeners.
         args: positional arguments of each call.
         kwargs: keyword arguments of each call.

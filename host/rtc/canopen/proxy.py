@@ -335,7 +335,7 @@ NOTHING: Final = ProxyRequest.NOTHING
 
 
 class ProxyRtc(RtComponent):
-    """An ordinary RT component that represents a device.
+    """RT component that represents a CANopen device in a system.
 
     The callbacks record requests. The server executes the requests on the bus after the period.
     on_reset fails until the device has booted again, so the proxy stays in Error until then.
@@ -343,7 +343,7 @@ class ProxyRtc(RtComponent):
     Not emulated: a CANopen node for the proxy on the bus (`visible_proxies` of K1).
 
     Args:
-        entry: node of the proxy in the System Definition.
+        entry: settings of the node in the System Definition.
         layouts: layouts of the PDOs of the device.
         sdo_layouts: objects of the device that have ports by SDO.
 
@@ -353,11 +353,11 @@ class ProxyRtc(RtComponent):
         sinks: RPDOs of the device, which take data from InPorts.
         sdo_sources: objects of the device whose values go to OutPorts.
         sdo_sinks: objects of the device that take values from InPorts.
-        requested: the request that the callbacks recorded.
+        requested: request that the callbacks recorded.
         passing: whether data from the device reach the OutPorts, which is True between
-        on_activated and on_deactivated.
+            on_activated and on_deactivated.
         confirmed: whether the device has reported Operational. Only then are data sent to the
-        device.
+            device.
         ready: whether the device can leave Error.
     """
 

@@ -79,7 +79,7 @@ _Table = Mapping[tuple[int, int], bytes]
 
 
 class ServerObjects:
-    """The server's own object dictionary, which answers SDO read requests.
+    """The server's own CANopen object dictionary, which answers SDO read requests of other nodes.
 
     | object | what |
     |---|---|
@@ -358,7 +358,7 @@ class RtcCanopenServer:
         return self._data.put(name, value) if result is None else result
 
     def start(self) -> None:
-        """Activate all nodes one after the other in the start order.
+        """Activate the nodes one after the other, in the start order of the System Definition.
 
         A node is activated when all nodes before it are Active. Therefore a node that does not boot
         delays all nodes after it.

@@ -151,13 +151,15 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 
 
 class Arrivals:
-    """A schedule item for received values: calls that are executed at the start of the next tick.
+    """Queue of values received by other threads, which are processed at the start of the next tick.
 
     No code reads a value before the next tick, so values need not wake the manager's thread. Waking
-    it for each value would take three times the processor time.
+    it for each value would take three times the processor time. The queue is an item of a
+    `Schedule`.
 
     Attributes:
-        due_us: due time, which is always `NEVER`, because the calls wait for a tick of other items.
+        due_us: due time, which is always `NEVER`, because the values wait for a tick that is due
+            for another reason.
     """
 
     due_us: Final = NEVER

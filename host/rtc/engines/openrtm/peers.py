@@ -164,7 +164,7 @@ def refuse_wrong_paths(manager: Manager) -> None:
 
 
 def parse_path(path: str) -> tuple[Endpoint, str]:
-    """Split a path in the notation of rtshell into the name server and the name in this server.
+    """Split a component's path, as in rtshell, into the name server and the name in that server.
 
     >>> parse_path("localhost:2809/robot.host_cxt/Joystick0.rtc")
     (Endpoint(host='localhost', port=2809), 'robot.host_cxt/Joystick0.rtc')
