@@ -190,7 +190,7 @@ class Chair(Closing):
             raise
 
     def set_guard(self) -> None:
-        """Set watchdog and stablemode. This is needed at the start and after EV:Initialized."""
+        """Set the RRC's watchdog and stablemode, at the start and after EV:Initialized."""
         if self.guard.watchdog_us:
             self.client.watchdog(self.guard.watchdog_us)
         if self.guard.stable:
@@ -236,11 +236,14 @@ class Chair(Closing):
             self.client.close()
 
     def close(self) -> None:
-        """Close the line. The watchdog stops VR2."""
+        """Close the line without stopping the motors first.
+
+        The RRC's watchdog then stops the wheelchair.
+        """
         self.client.close()
 
     def leave_driving(self) -> None:
-        """Let the stick drive on after the end of the program, without a watchdog."""
+        """Let the stick continue to drive after the end of the program, without a watchdog."""
         self.moved = False
 
     def _leave(self) -> None:
@@ -267,7 +270,10 @@ class Chair(Closing):
         return None if latest is None else latest.value
 
     def require_on(self) -> StatusA:
-        """Return a status line. Raise ChairStopped if VR2 is off."""
+        """Return a status line of the wheelchair.
+
+        Raise ChairStopped if the wheelchair (VR2) is off.
+        """
         status = self.status()
         if status is None:
             raise ChairStopped(_OFF)
@@ -454,6 +460,6 @@ class Chair(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line, or None if VR2 has been off since."""
+        """The newest status line, or None if the wheelchair (VR2) has been off since."""
         latest, since_us = self.client.latest_status, self._status_since_us
         return latest if latest and since_us is not None and latest.at_us >= since_us else None

@@ -232,7 +232,7 @@ class Channel:
         self._raise_alarm()
 
     def resume(self) -> None:
-        """Lift the stop after too many refusals."""
+        """Allow sending again after it was stopped by too many refusals."""
         self.matcher.refusals.clear()
         self._alarm = None
 

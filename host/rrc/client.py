@@ -125,7 +125,7 @@ class RrcClient(Closing):
             self.command(cmd.DeviceName())
 
     def close(self) -> None:
-        """Close the link. A watchdog that is set will stop VR2."""
+        """Close the link. If a watchdog is set, the RRC then stops the wheelchair."""
         self._link.close()
 
     @property
@@ -297,15 +297,15 @@ class RrcClient(Closing):
         self.command(cmd.Output(v_pct, w_pct), confirm=confirm)
 
     def device(self) -> str:
-        """Return the device name."""
+        """Return the device name that the RRC reports."""
         return self.command(cmd.DeviceName())
 
     def version(self) -> str:
-        """Return the version."""
+        """Return the version that the RRC reports."""
         return self.command(cmd.Version())
 
     def date(self) -> str:
-        """Return the date and time of compilation."""
+        """Return the date and time of compilation that the RRC reports."""
         return self.command(cmd.Date())
 
     def speedmode(self, mode: int, *, locked: bool = False) -> None:
@@ -361,7 +361,7 @@ class RrcClient(Closing):
         self.command(cmd.Status(int(on)))
 
     def poweroff(self) -> None:
-        """Force VR2 to stop. VR2 must then be switched off by its power button."""
+        """Force the wheelchair (VR2) to stop. It must then be switched on by its power button."""
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:

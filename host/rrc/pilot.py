@@ -107,7 +107,7 @@ class Pilot:
         self._aim_pct = 0, 0
 
     def aim(self, v_pct: int, w_pct: int) -> None:
-        """Change the values to drive, in per cent."""
+        """Change the translation and rotation to drive by a number of per cent each."""
         v, w = self._aim_pct
         self._aim_pct = max(-100, min(100, v + v_pct)), max(-100, min(100, w + w_pct))
 
@@ -127,7 +127,7 @@ class Pilot:
         self._acts.append(act)
 
     def limit_stick(self, pct: int) -> None:
-        """Change the limit of the stick."""
+        """Change the limit of the stick by a number of per cent."""
         self._most_pct = max(0, min(100, self._most_pct + pct))
         if self._drives is Drives.STICK:
             self._acts.append(lambda: self._take(Drives.STICK))
@@ -137,7 +137,7 @@ class Pilot:
         self._acts.append(lambda: self._client.beep(200_000))
 
     def power_off(self) -> None:
-        """Force VR2 to stop."""
+        """Force the wheelchair (VR2) to stop."""
         self.release()
         self._acts.append(self._power_off)
 

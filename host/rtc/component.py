@@ -263,7 +263,7 @@ class RtComponent(ComponentAction):
         return port
 
     def remove_port(self, port: AnyPort) -> None:
-        """End the connectors of a port and remove the port."""
+        """Disconnect a port and remove it from the component."""
         port.disconnect_all()
         del self.ports[port.name]
         port.owner = ""
@@ -511,7 +511,7 @@ class ExecutionContexts:
         self._known = False
 
     def add(self, context: ExecutionContext, now_us: int) -> None:
-        """Tick a context from now on. Adding a context twice has no effect."""
+        """Tick an execution context from now on. Adding a context twice has no effect."""
         if context not in self._contexts:
             context.tick(now_us)
             self._contexts.append(context)
@@ -519,7 +519,7 @@ class ExecutionContexts:
             self.replan()
 
     def remove(self, context: ExecutionContext) -> None:
-        """Stop ticking a context."""
+        """Stop ticking an execution context."""
         self._contexts.remove(context)
         context.join(ExecutionContexts())
         self.replan()
@@ -640,7 +640,7 @@ class ExecutionContext:
         self._ticked_us, self._others = self.now_us, others
 
     def close(self) -> None:
-        """Deactivate all participants at once, stop the context, and remove all participants."""
+        """Deactivate all components of the context at once, stop it, and remove them from it."""
         for participant in self._participants:
             participant.leave()
         self.stop()

@@ -166,7 +166,7 @@ class SeqOut(RtComponent):
 
 
 class ConfigSample(RtComponent):
-    """A sample component with parameters that it does not use, named as in OpenRTM."""
+    """Example component with unused configuration parameters, named as in OpenRTM."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConfigSample", "Configuration example component")
 

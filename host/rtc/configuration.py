@@ -303,7 +303,7 @@ class Configuration:
         self.active_id, self.changed = set_id, True
 
     def update(self) -> None:
-        """Let the values of the active set take effect."""
+        """Apply the values of the active set to the parameters."""
         self.changed = False
         values = self._sets[self.active_id]
         for name, parameter in self._parameters.items():

@@ -40,17 +40,17 @@ class DeviceComponent(RtComponent, ABC, Generic[C]):
 
     @abstractmethod
     def open_client(self) -> C:
-        """Return a new client. Raise LinkError if the device cannot be reached."""
+        """Return a new client for the device. Raise LinkError if the device cannot be reached."""
 
     @abstractmethod
     def exchange(self, ec: ExecutionContext, client: C) -> None:
-        """Communicate with the device in a period.
+        """Communicate with the device once in each period while Active.
 
         Raise LinkError or DeviceRefused if that fails.
         """
 
     def release(self, ec: ExecutionContext) -> None:
-        """Do final work before the client is closed. The default implementation does nothing."""
+        """Do final work with the device before the client is closed. By default, do nothing."""
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Open the client, also after Error."""

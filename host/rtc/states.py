@@ -34,7 +34,7 @@ class ReturnCode(IntEnum):
 
 
 class LifeCycleState(IntEnum):
-    """State of a component in an execution context (LifeCycleState)."""
+    """State of a component in an execution context (OMG RTC, LifeCycleState)."""
 
     CREATED = 0
     INACTIVE = 1
@@ -43,7 +43,7 @@ class LifeCycleState(IntEnum):
 
 
 class ExecutionKind(IntEnum):
-    """Kind of an execution context (ExecutionKind)."""
+    """Kind of an execution context (OMG RTC, ExecutionKind)."""
 
     PERIODIC = 0
     EVENT_DRIVEN = 1

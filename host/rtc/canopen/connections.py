@@ -144,7 +144,10 @@ class PdoLinks:
         self._make(now_us, link)
 
     def remove(self, now_us: int, link: definition.PdoLink) -> None:
-        """Restore the RPDO's own COB-ID. Raise ServerRefused if there is no such link."""
+        """Remove a PDO link: give the RPDO its own COB-ID back.
+
+        Raise ServerRefused if there is no such link.
+        """
         if link not in self.links:
             raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
         own = self._own.get(link.target, self.layout(link.target).cob_id)
@@ -213,7 +216,10 @@ class PdoLinks:
 
 
 def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
-    """Return the layout of a PDO. Raise ServerRefused if the PDO is off."""
+    """Return the layout of a PDO from the layouts of its node.
+
+    Raise ServerRefused if the PDO is off or does not exist.
+    """
     for layout in layouts:
         if layout.index == name.index:
             return layout

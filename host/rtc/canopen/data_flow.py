@@ -134,7 +134,7 @@ class SdoDataFlow:
         self._failed = set[tuple[int, str]]()  # node-ID and port that were reported
 
     def exchange(self, now_us: int) -> None:
-        """Begin the transfers of a period."""
+        """Begin the SDO transfers of a period."""
         for node_id, node in self._nodes.items():
             proxy = node.proxy
             if proxy is None or not (proxy.sdo_sources or proxy.sdo_sinks):

@@ -47,7 +47,7 @@ PDO_CAN_IDS: Final = range(0x181, 0x6E0)
 
 
 class Role(StrEnum):
-    """Role of a node for its proxy."""
+    """Type of the device that a node is, which decides how its proxy controls it."""
 
     DEVICE_RTC = "device_rtc"
     DEVICE = "device"  # off-the-shelf, CiA 301 alone
@@ -224,7 +224,7 @@ class PdoLink:
 
 @dataclass(frozen=True, slots=True)
 class RtConnection:
-    """Two ports that are connected through the PC, such as `Palette0.ai` and `Logger0.in`."""
+    """Two ports that are to be connected through the PC, such as `Palette0.ai` and `Logger0.in`."""
 
     source: str
     target: str
@@ -248,7 +248,7 @@ class StartEntry:
 
 @dataclass(frozen=True, slots=True)
 class SystemDefinition:
-    """All settings of the server."""
+    """Settings of the CANopen server: the nodes of a bus, their links and connections."""
 
     nodes: tuple[NodeEntry, ...]
     bus: BusEntry = BusEntry()
@@ -322,7 +322,7 @@ class DeviceFile:
 
 
 def read_device_file(path: Path) -> DeviceFile:
-    """Read an EDS, DCF, XDD or XDC.
+    """Read the data about a device type from its EDS, DCF, XDD or XDC file.
 
     Raises:
         DefinitionError: the file cannot be read.

@@ -68,7 +68,7 @@ def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> N
 
 
 def write_definition(definition: SystemDefinition) -> str:
-    """Return the definition as text."""
+    """Return a System Definition as text for a file."""
     content = {name: value for name, value in _sections(definition) if value}
     return yaml.dump(
         content,

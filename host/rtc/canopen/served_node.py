@@ -189,7 +189,7 @@ _RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 
 
 class NodePhase(Enum):
-    """Phase of the set-up of a node."""
+    """Phase of the set-up of a node by the server."""
 
     ABSENT = "absent"
     LISTENING = "listening"  # it booted though it was there: itself, or another of its node-ID
@@ -211,7 +211,7 @@ _LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
 
 
 class NodeServer(Protocol):
-    """The functions of the server that a node calls."""
+    """Functions of the CANopen server that a node calls."""
 
     def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Record an event."""
@@ -285,7 +285,7 @@ class ServedNode:
         return self.operations.nmt_state
 
     def search(self, now_us: int) -> None:
-        """Look for the node on the bus."""
+        """Look for the node on the bus by SDO requests until it answers."""
         self.operations.now_us = now_us
         self.phase, self.lost = NodePhase.ABSENT, False
         self._duplicates.forget()
@@ -294,7 +294,7 @@ class ServedNode:
         self._plan()
 
     def boot(self, now_us: int) -> None:
-        """Set up the node from any state."""
+        """Set up the node again, in any state."""
         self.operations.now_us = now_us
         self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._plan()
@@ -319,7 +319,7 @@ class ServedNode:
         self.search(now_us)
 
     def refuse(self, problem: str) -> None:
-        """Refuse the node for a reason, and leave it alone until it boots again."""
+        """Refuse to set up the node, for a reason, until it boots again."""
         self.phase, self.problem = NodePhase.REFUSED, problem
 
     def pause(self, now_us: int, span_us: int) -> None:

@@ -327,7 +327,7 @@ class RtcCanopenServer:
         return out
 
     def stop(self, now_us: int) -> Frames:
-        """End all proxies, and leave the nodes as the definition requires (K14, finalize)."""
+        """End all proxies and leave the nodes. Return the frames to send (K14, finalize)."""
         self.now_us = now_us
         for node in self.nodes.values():
             node.dialogue.clear()

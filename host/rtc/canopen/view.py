@@ -118,7 +118,7 @@ class ComponentView:
 
 @dataclass(frozen=True, slots=True)
 class SystemView:
-    """The state of a whole system at one time; see the properties of `ServerView`."""
+    """State of a whole system at one time: nodes, components, links and connections."""
 
     nodes: tuple[NodeView, ...]
     components: tuple[ComponentView, ...]
@@ -212,21 +212,27 @@ class ServerView:
         return tuple(self._server.connections.wanted)
 
     def node(self, node_id: int) -> NodeView:
-        """Return one node. Raise ServerRefused if there is no such node."""
+        """Return the present state of one node. Raise ServerRefused if there is no such node."""
         return self._view(self._node(node_id))
 
     def activate(self, name: str) -> None:
-        """Request Active. Raise RtcRefused if this is impossible for the proxy or component."""
+        """Request that a proxy or component moves to Active.
+
+        Raise RtcRefused if that is not possible.
+        """
         self._server.manager.activate(name)
 
     def deactivate(self, name: str) -> None:
-        """Request Inactive. Raise RtcRefused if this is impossible for the proxy or component."""
+        """Request that a proxy or component moves to Inactive.
+
+        Raise RtcRefused if that is not possible.
+        """
         self._server.manager.deactivate(name)
 
     def reset(self, name: str) -> None:
-        """Request Inactive from Error.
+        """Request that a proxy or component moves from Error to Inactive.
 
-        Raise RtcRefused if the proxy or component cannot do this.
+        Raise RtcRefused if that is not possible.
         """
         self._server.manager.reset(name)
 
@@ -276,11 +282,17 @@ class ServerView:
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
     def read(self, node_id: int, index: int, sub: int) -> PendingTransfer[bytes]:
-        """Read an object of a device. Raise ServerRefused if there is no such node."""
+        """Start reading an object of a device by SDO. The result appears in the returned transfer.
+
+        Raise ServerRefused if there is no such node.
+        """
         return self._transfer(node_id, upload(index, sub), b"")
 
     def write(self, node_id: int, index: int, sub: int, data: bytes) -> PendingTransfer[bytes]:
-        """Write an object of a device. Raise ServerRefused if there is no such node."""
+        """Start writing an object of a device by SDO. The result appears in the returned transfer.
+
+        Raise ServerRefused if there is no such node.
+        """
         return self._transfer(node_id, download(index, sub, data), b"")
 
     def read_pdos(self, node_id: int) -> PendingTransfer[pdo_edit.Pdos]:
@@ -346,7 +358,7 @@ class ServerView:
         return self._node(node_id).file
 
     def definition(self) -> SystemDefinition:
-        """Return the definition with the present PDOs, connections and links."""
+        """Return the System Definition with the present PDOs, connections and links."""
         return replace(
             self._server.definition,
             nodes=tuple(node.entry for node in self._server.nodes.values()),

@@ -61,7 +61,7 @@ class Console:
                     setattr(component, attribute, partial(_prefixed, printed, name))
 
     def read(self, descriptor: int) -> None:
-        """Read the lines that were typed. Never wait."""
+        """Process the lines that the user has typed, without waiting."""
         if self.is_open and ready([descriptor], wait_s=0)[0] and _in_foreground(descriptor):
             data = os.read(descriptor, _READ_BYTES)
             self.is_open = bool(data)

@@ -327,7 +327,7 @@ def _texts(request: Object, key: str, count: int) -> list[str]:
 
 
 def describe_component(manager: Manager, component: RtComponent) -> Object:
-    """Return the full description of a component."""
+    """Return the full description of a component, as the control socket sends it."""
     name, spec = component.instance_name, component.spec
     return {
         "name": name,

@@ -47,7 +47,7 @@ class SystemPicture(FramedView):
     ]
 
     class Moved(Message):
-        """A message: another item is under the cursor."""
+        """Message of a `SystemPicture`: another box or port is under the cursor."""
 
     def __init__(self, id: str = "picture") -> None:  # noqa: A002 - Textual's name
         super().__init__(id)

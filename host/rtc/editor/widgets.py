@@ -40,7 +40,7 @@ _MARGIN: Final = 2
 
 
 class FramedView(LineView):
-    """A view with titles on its frame, which is painted again with and without the focus."""
+    """Widget with titles in its frame, which is drawn again when the keyboard focus changes."""
 
     def paint(self) -> None:
         """Show the content and the cursor."""

@@ -49,14 +49,14 @@ class BaseConnection(Protocol):
 
 
 def start(connection: BaseConnection, set_id: str = "default") -> None:
-    """Activate a configuration set, and activate all components."""
+    """Activate a configuration set of a cart's components, then activate the components."""
     connection.chain.use(set_id)
     connection.chain.activate()
     connection.run_to(connection.now_us + SETTLE_US)
 
 
 def stop(connection: BaseConnection) -> None:
-    """Deactivate all components. RefHardRh3 stops the base."""
+    """Deactivate all components of a cart. RefHardRh3 then stops the base."""
     connection.chain.deactivate()
     connection.run_to(connection.now_us + 2 * PERIOD_US)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Pose(NamedTuple):
-    """A position and a heading."""
+    """Position (x and y in m) and heading (in rad) on a plane."""
 
     x: float = 0.0
     y: float = 0.0
@@ -65,7 +65,7 @@ def clip(value: float, limit: float) -> float:
 
 
 class Wheels(NamedTuple):
-    """The cart geometry that an odometry uses: radii and axle in m."""
+    """Geometry of a cart that an odometry uses: the wheel radii and the axle length in m."""
 
     left: float
     right: float

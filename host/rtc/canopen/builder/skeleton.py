@@ -27,7 +27,7 @@ _LONGEST: Final = 88
 
 
 def write_skeleton(project: Project) -> str:
-    """Return the text of a Python file with the component."""
+    """Return the text of a Python file with the skeleton of a DeviceRTC's component."""
     return "\n".join([*_head(project), *_attributes(project), *_callbacks(), ""])
 
 
