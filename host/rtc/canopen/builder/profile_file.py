@@ -52,6 +52,9 @@ def python_name(name: str) -> str:
     """Turn the name of a port or object into a Python attribute name of the generated component.
 
     If the name is reserved or used by the component itself, an underscore is appended.
+
+    >>> python_name("in"), python_name("target_um")
+    ('in_', 'target_um')
     """
     taken = keyword.iskeyword(name) or name in COMPONENT_NAMES | _IMPORTED or name.isupper()
     return f"{name}_" if taken else name
@@ -63,7 +66,11 @@ def c_name(name: str) -> str:
 
 
 def snake_name(name: str) -> str:
-    """Turn a name into lower case with underscores, for names of files and constants."""
+    """Turn a name into lower case with underscores, for names of files and constants.
+
+    >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
+    ('unsigned_long_long', 'gripper2')
+    """
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 

@@ -103,6 +103,9 @@ def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
     The list begins with the start. For each point of the path, it has two poses: the previous
     position with the heading towards the point, and the point with that heading. The list ends with
     the last point in its wanted heading (RH3 specification, path calculation).
+
+    >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]
+    [(0.0, 0.0, 0.0), (0.0, 0.0, 1.57), (0.0, 2.0, 1.57), (0.0, 2.0, 0.0)]
     """
     way, here = [start], start
     for point in points:
