@@ -26,10 +26,11 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 
 
 class CallQueue:
-    """A queue of calls from other threads, which the manager's thread executes between its ticks.
+    """Queue of calls from other threads, which the manager's thread executes between its ticks.
 
-    A `ServingClock` calls `serve` while it waits. If this thread also serves a control socket,
-    `LineServer.attach(queue, queue.make)` serves both.
+    Other threads use it because only the manager's thread may access a manager. A `ServingClock`
+    calls `serve` while it waits for the next tick. If the manager's thread also serves a control
+    socket, `LineServer.attach(queue, queue.make)` serves both.
     """
 
     def __init__(self) -> None:

@@ -119,7 +119,7 @@ def parse_project(text: str) -> Project:
     """Parse the text of a profile file of a DeviceRTC.
 
     Raises:
-        _ProfileError: the file is not TOML, a key is unknown, a value has the wrong type, or no
+        ValueError: the file is not TOML, a key is unknown, a value has the wrong type, or no
             DeviceRTC can have this profile.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
