@@ -670,8 +670,11 @@ class NodeFaults(Copyable):
 
     @property
     def emcy_id(self) -> int:
-        """CAN-ID of the EMCY."""
-        return self.cob_id(0x1014, 0, _EMCY_COB_ID + self.node.slave.node_id)
+        """CAN-ID of the EMCY. Before the boot-up, 1014h does not have its value yet."""
+        slave = self.node.slave
+        usual = _EMCY_COB_ID + slave.node_id
+        booted = slave.state is not NmtState.INITIALISING
+        return self.cob_id(0x1014, 0, usual) if booted else usual
 
     @property
     def _error_control_id(self) -> int:

@@ -618,3 +618,13 @@ def test_faults_of_a_node_in_real_time(tmp_path: Path) -> None:
         bench.clear("bus_off")
         assert bench.wait_until(lambda: bench.get("can_state") == "error-active", "5s")
     logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize("fault_name", ["emcy_storm", "babble"])
+def test_an_emcy_before_the_boot_up_has_the_node_id(fault_name: str) -> None:
+    with Bench("epos") as bench, bench.can_bus() as bus:
+        bench["epos"].fault(fault_name)
+        heard = [bus.recv(0.1) for _ in range(5)]
+    ids = {message.arbitration_id for message in heard if message is not None}
+    assert 0x081 in ids
+    assert 0x080 not in ids
