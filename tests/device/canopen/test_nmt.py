@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.device.canopen.objects import write
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.slave import UNCONFIGURED
@@ -63,10 +64,20 @@ def test_commands_for_this_node_or_all_are_obeyed(command: str, state: NmtState)
     assert bus.slave.state is state
 
 
-def test_a_node_starts_itself_if_1f80h_says_so() -> None:
-    bus = make_bus(startup=8)
+@pytest.mark.parametrize(
+    ("startup", "state"),
+    [
+        (8, NmtState.OPERATIONAL),
+        (10, NmtState.OPERATIONAL),
+        (0, NmtState.PRE_OPERATIONAL),
+        (9, NmtState.PRE_OPERATIONAL),
+        (12, NmtState.PRE_OPERATIONAL),
+    ],
+)
+def test_a_node_starts_itself_if_1f80h_says_so(startup: int, state: NmtState) -> None:
+    bus = make_bus(startup=startup)
     bus.step()
-    assert bus.slave.state is NmtState.OPERATIONAL
+    assert bus.slave.state is state
 
 
 def test_heartbeats_follow_the_boot_up_and_do_not_drift() -> None:
@@ -83,6 +94,15 @@ def test_a_heartbeat_time_set_from_the_inside_counts_from_the_next_tick() -> Non
     assert bus.run(1) == ["705#7F"]
     bus.slave.dictionary[0x1017, 0].value = 0
     assert bus.run(200) == []
+
+
+def test_writing_the_same_heartbeat_time_restarts_the_period() -> None:
+    bus = make_bus(heartbeat_ms=100)
+    bus.step()
+    assert bus.run(60) == []
+    write(bus, 0x1017, 100)
+    assert bus.run(100) == []
+    assert bus.step() == ["705#7F"]
 
 
 def test_an_unconfigured_node_sends_no_heartbeat() -> None:

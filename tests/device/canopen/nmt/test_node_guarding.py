@@ -1,6 +1,9 @@
 from __future__ import annotations
 
-from tests.device.canopen.objects import booted, errors, u8, u16, write
+import pytest
+
+from tests.device.canopen.objects import U8, array, booted, errors, u8, u16, write
+from tickrig.wire.canopen.nmt import NmtState
 
 LOST = "085#3081110000000000"
 BACK = "085#0000000000000000"
@@ -17,6 +20,12 @@ def test_the_toggle_goes_on_when_the_state_changes() -> None:
     bus = booted(u16(0x100C))
     assert bus.step("705#R1", "000#0105", "705#R1") == ["705#7F", "705#85"]
     assert bus.step("000#0205", "705#R1") == ["705#04"]
+
+
+def test_the_toggle_changes_no_bit_of_the_state() -> None:
+    bus = booted(u16(0x100C))
+    bus.step("000#0205", "705#R1")
+    assert bus.step("705#R1") == ["705#84"]
 
 
 def test_reset_communication_resets_the_toggle() -> None:
@@ -38,6 +47,12 @@ def test_the_heartbeat_has_priority() -> None:
     assert bus.step("705#R1") == []
     write(bus, 0x1017, 0)
     assert bus.step("705#R1") == ["705#FF"]
+
+
+def test_the_shortest_heartbeat_time_has_priority() -> None:
+    bus = booted(u16(0x100C), u16(0x1017))
+    write(bus, 0x1017, 1)
+    assert bus.step("705#R1") == []
 
 
 def test_life_guarding_begins_with_the_first_request() -> None:
@@ -80,3 +95,21 @@ def test_a_life_time_of_nothing_is_not_watched() -> None:
     bus = booted(errors(), u16(0x100C, 100), u8(0x100D, 0))
     bus.step("705#R1")
     assert bus.run(500) == []
+
+
+def test_without_a_life_time_factor_no_request_is_late() -> None:
+    bus = booted(errors(), u16(0x100C, 100))
+    bus.step("705#R1")
+    assert bus.run(500) == []
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "state"),
+    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
+)
+def test_a_late_request_is_a_communication_error(behaviour: int, state: NmtState) -> None:
+    guarded = u16(0x100C, 100), u8(0x100D, 2)
+    bus = booted(errors(), *guarded, array(0x1029, behaviour, kind=U8))
+    bus.step("000#0105", "705#R1")
+    assert bus.run(200) == [LOST]
+    assert bus.slave.state is state
