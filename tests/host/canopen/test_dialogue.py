@@ -17,6 +17,7 @@ from tickrig.host.canopen.dialogue import (
     Dialogue,
     Failure,
     Guard,
+    Misnamed,
     NmtRequest,
     Object,
     Pause,
@@ -27,6 +28,7 @@ from tickrig.host.canopen.dialogue import (
 from tickrig.host.canopen.errors import SdoFailed, SdoMisnamed
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 Exchange = tuple[str, str]
@@ -36,14 +38,17 @@ Exchange = tuple[str, str]
 class Talk:
     """One script with a node, and what came of it."""
 
-    def __init__(self, script: Script[Any]) -> None:
+    def __init__(
+        self, script: Script[Any], on_misnamed: Misnamed | None = None, now_us: int = 0
+    ) -> None:
         self.sent: list[str] = []
         self.result: Any = None
         self.failure: Failure | None = None
-        self.dialogue = Dialogue(
-            5, lambda can_id, data: self.sent.append(f"{can_id:03X}#{data.hex()}")
-        )
-        self.dialogue.start(0, QueuedScript("test", script, self._done, self._failed))
+        self.dialogue = Dialogue(5, self._send, on_misnamed=on_misnamed)
+        self.start(now_us, script)
+
+    def start(self, now_us: int, script: Script[Any]) -> None:
+        self.dialogue.start(now_us, QueuedScript("test", script, self._done, self._failed))
 
     def answer(self, now_us: int, text: str) -> None:
         self.dialogue.receive_sdo(now_us, bytes.fromhex(text))
@@ -245,6 +250,34 @@ def test_what_names_no_object_may_answer_what_was_asked_before(stray: str) -> No
     assert talk.result == [b"\2\0\0\0"]
 
 
+def test_a_late_answer_shows_which_earlier_requests_stay_without_an_answer() -> None:
+    talk = Talk(steps())
+    talk.dialogue.remember((0x2000, 0))
+    talk.dialogue.remember((0x2001, 0))
+    talk.answer(100, "4301200001000000")
+    talk.start(200, upload(0x2000, 0))
+    assert talk.sent == ["605#4000200000000000"]
+
+
+def test_after_an_abort_by_the_host_the_object_is_read_behind_a_fence() -> None:
+    talk = Talk(reading(2))
+    talk.answer(100, "2000000000000000")
+    assert talk.sent[1:] == ["605#8000200000000305", "605#4000100000000000"]
+
+
+def test_a_repeated_request_counts_once() -> None:
+    unanswered = Unanswered()
+    for sub in (1, 1, 2, 3, 3, 1):
+        unanswered.add((0x2000, sub))
+    assert unanswered == [(0x2000, 1), (0x2000, 2), (0x2000, 3), (0x2000, 1)]
+
+
+def test_fences_are_mandatory_objects_and_the_sub_indices_of_the_first() -> None:
+    identity = ((0x1018, sub) for sub in range(5))
+    assert FENCES[:7] == ((0x1000, 0), (0x1001, 0), *identity)
+    assert FENCES[7:] == tuple((0x1000, sub) for sub in range(1, 255))
+
+
 @pytest.mark.parametrize("asked", FENCES[:8])
 def test_a_fence_is_another_object_than_all_that_were_asked_for_in_vain(asked: Object) -> None:
     unanswered = Unanswered()
@@ -284,10 +317,33 @@ def test_an_object_is_read_again_when_no_copy_of_its_answer_can_come_any_more() 
     assert talk.result == [b"\1\0\0\0", b"\2\0\0\0"]
 
 
+def test_a_segment_while_a_copy_may_come_sends_no_request() -> None:
+    talk = Talk(reading(2))
+    talk.answer(500, "4300200001000000")
+    talk.answer(600, "0011223344556677")
+    assert (len(talk.sent), talk.dialogue.due_us) == (1, 500 + LEAST_COPY_US)
+
+
+def test_an_object_is_read_at_once_when_the_time_for_a_copy_is_over() -> None:
+    talk = Talk(reading(1))
+    talk.answer(500, "4300200001000000")
+    talk.start(2_500, reading(1))
+    assert len(talk.sent) == 2
+
+
+@pytest.mark.parametrize(("answer_ms", "due_ms"), [(101, 103), (107, 114), (120, 140), (300, 320)])
+def test_a_copy_may_come_as_long_as_the_answer_took_within_limits(
+    answer_ms: int, due_ms: int
+) -> None:
+    talk = Talk(reading(2), now_us=100_000)
+    talk.answer(answer_ms * 1_000, "4300200001000000")
+    assert talk.dialogue.due_us == due_ms * 1_000
+
+
 def test_a_job_that_is_forgotten_leaves_its_question_open() -> None:
     talk = Talk(upload(0x2000, 0))
     talk.dialogue.clear()
-    talk.dialogue.start(0, QueuedScript("again", upload(0x2000, 0), talk._done, talk._failed))
+    talk.start(0, upload(0x2000, 0))
     assert talk.sent == ["605#4000200000000000", "605#4000100000000000"]
 
 
@@ -297,12 +353,39 @@ def test_jobs_run_one_after_the_other() -> None:
         yield Pause(1_000)
 
     talk = Talk(pausing())
-    talk.dialogue.start(
-        0, QueuedScript("second", download(0x1017, 0, b"\0\0"), talk._done, talk._failed)
-    )
+    talk.start(0, download(0x1017, 0, b"\0\0"))
     assert talk.sent == ["000#0105"]
     talk.dialogue.tick(1_000)
     assert talk.sent == ["000#0105", "605#2b17100000000000"]
+
+
+def test_a_job_from_a_callback_runs_after_those_that_wait() -> None:
+    dialogue, ended, running = idle(), list[str](), list[str]()
+
+    def start_third(_: object) -> None:
+        dialogue.start(50, job(steps(), ended, "third "))
+        running.append(dialogue.job.what if dialogue.job else "")
+
+    dialogue.start(0, QueuedScript("first", steps(Pause(50)), start_third, start_third))
+    dialogue.start(0, job(steps(Pause(50)), ended, "second "))
+    dialogue.tick(50)
+    assert running == ["second "]
+    dialogue.tick(100)
+    assert ended == ["second done", "third done"]
+
+
+def test_an_abort_ends_the_transfer_and_drops_all_jobs() -> None:
+    talk, ended = Talk(upload(0x2000, 0)), list[str]()
+    talk.dialogue.start(0, job(steps(Pause(50)), ended))
+    talk.dialogue.abort(AbortCode.GENERAL)
+    assert talk.sent[1:] == ["605#8000200000000008"]
+    assert (talk.dialogue.job, ended) == (None, ["dropped"])
+
+
+def test_without_a_transfer_an_abort_sends_nothing() -> None:
+    talk = Talk(steps(Pause(50)))
+    talk.dialogue.abort(AbortCode.GENERAL)
+    assert (talk.sent, talk.dialogue.job) == ([], None)
 
 
 @given(st.lists(st.binary(max_size=9), max_size=30), st.booleans())
@@ -567,3 +650,38 @@ def test_an_abort_that_names_another_object_is_ignored_while_others_are_open() -
     dialogue.tick(500_000)
     assert [type(error) for error in ended] == [SdoMisnamed]
     assert misnamed == [((0x5FFD, 0), ABORT_OF_1000)]
+
+
+def test_a_value_that_names_another_object_aborts_the_transfer() -> None:
+    talk = Talk(upload(0x5FFD, 0), lambda at, data: None)
+    talk.dialogue.receive_sdo(1_000, VALUE_OF_1000)
+    talk.dialogue.tick(101_000)
+    assert talk.sent[1:] == ["605#80fd5f0000000008"]
+
+
+def test_after_an_answer_that_names_another_object_the_right_one_is_read_at_once() -> None:
+    talk = Talk(reading(2), lambda at, data: None)
+    talk.dialogue.receive_sdo(1_000, ABORT_OF_1000)
+    talk.dialogue.tick(101_000)
+    assert talk.sent == ["605#4000200000000000"] * 2
+    talk.answer(102_000, "4300200002000000")
+    assert talk.result == ["2000h:00 aborted: 06020000h NO_OBJECT", b"\2\0\0\0"]
+
+
+def test_an_answer_that_names_another_object_does_not_count_for_the_next_request() -> None:
+    talk = Talk(reading(2), lambda at, data: None)
+    talk.dialogue.receive_sdo(1_000, ABORT_OF_1000)
+    talk.answer(1_500, "4300200001000000")
+    talk.dialogue.tick(talk.dialogue.due_us)
+    talk.dialogue.tick(talk.dialogue.due_us)
+    assert talk.result == [b"\1\0\0\0", "2000h:00 was not answered"]
+
+
+def test_an_answer_that_does_not_name_the_fence_is_one_to_the_fence() -> None:
+    misnamed: list[tuple[Object, bytes]] = []
+    talk = Talk(reading(2), lambda at, data: misnamed.append((at, data)))
+    talk.dialogue.tick(SDO_TIMEOUT_US)
+    value_of_2001 = bytes.fromhex("4301200001000000")
+    talk.dialogue.receive_sdo(600_000, value_of_2001)
+    talk.dialogue.tick(2 * SDO_TIMEOUT_US)
+    assert misnamed == [((0x1000, 0), value_of_2001)]
