@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
+from tickrig.device.rrc.machine import ReceiveBuffer
 from tickrig.wire.rrc.message import check_digit
 
 
@@ -195,6 +196,18 @@ def test_before_power_on_one_line_in_two_ticks_is_worked_on() -> None:
     bench.align()
     sent = [bench.step(*["stablemode0"] * 3), *(bench.step() for _ in range(4))]
     assert [len(lines) for lines in sent] == [1, 0, 1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("received", "blocks"),
+    [(b"x" * 9, 0), (b"x" * 16, 0), (b"x" * 17, 1), (b"x" * 16 + b"\n", 0), (b"x" * 17 + b"\n", 1)],
+)
+def test_blocks_of_the_buffer_size_count_from_the_byte_after_an_overflow(
+    received: bytes, blocks: int
+) -> None:
+    buffer = ReceiveBuffer(8)
+    buffer.push(received)
+    assert (buffer.overflows, buffer.thrown_blocks) == (1, blocks)
 
 
 def test_stablemode_is_asked_for_by_the_line_after_it_in_the_same_tick() -> None:

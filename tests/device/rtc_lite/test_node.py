@@ -170,6 +170,13 @@ def test_a_callback_that_takes_time_delays_its_answer() -> None:
     assert bench.ask("CY\x01") == "CY@\x01"
 
 
+def test_a_callback_takes_at_most_10_s() -> None:
+    bench = NodeBench().enter("Active")
+    bench.node.inputs.set("callback_ms", 10_000)
+    with pytest.raises(ValueError, match="callback_ms"):
+        bench.node.inputs.set("callback_ms", 10_001)
+
+
 def test_each_callback_of_an_abort_takes_its_time() -> None:
     bench = NodeBench().enter("Active")
     bench.node.inputs.set("callback_ms", 30)
