@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import PS_PER_US, UartSetting
 
 sends = st.lists(st.tuples(st.integers(0, 3_000), st.binary(max_size=30)), max_size=12)
 
@@ -206,3 +207,96 @@ def test_it_can_be_polled_byte_by_byte_as_of_the_times_of_arrival() -> None:
     assert arrived == [
         (at_us, bytes([value])) for at_us, value in zip(times, b"abcdef", strict=True)
     ]
+
+
+def test_a_byte_that_begins_now_is_not_dropped() -> None:
+    line = SerialLine(baud=100_000)
+    line.a.send(100, b"ab")
+    line.a.drop_unsent(100)
+    assert line.b.poll(1_000) == b"a"
+
+
+def test_a_byte_does_not_arrive_before_it_is_sent_on_a_fast_line() -> None:
+    line = SerialLine(baud=10_000_000)
+    line.a.send(100, b"x")
+    assert line.a.unsent(100) == 1
+
+
+def test_dropped_bytes_leave_room_for_others() -> None:
+    line = SerialLine(baud=100_000, buffer_bytes=4)
+    line.a.send(0, b"abcd")
+    line.a.drop_unsent(0)
+    line.a.send(10_000, b"efgh")
+    assert line.a.room(20_000) == 3  # 5 of 8 bytes in both buffers
+
+
+def test_a_byte_on_the_line_needs_its_room_when_nothing_is_dropped() -> None:
+    line = SerialLine(baud=100_000, buffer_bytes=4)
+    line.a.send(0, b"a")
+    line.a.drop_unsent(0)
+    line.a.send(10_000, b"efgh")
+    assert line.a.room(20_000) == 3
+
+
+def test_bytes_that_have_not_arrived_can_be_withdrawn() -> None:
+    line = SerialLine(baud=9_600)
+    line.a.send(0, b"abcd")
+    starts_ps = [number * 10_000_000 * PS_PER_US // 9_600 for number in (1, 2, 3)]
+    assert line.a.withdraw(1_100) == list(zip(starts_ps, b"bcd", strict=True))
+    assert (line.a.unsent(1_100), line.b.poll(10_000), line.b.due_us) == (0, b"a", NEVER)
+
+
+def test_a_line_without_its_withdrawn_bytes_is_idle() -> None:
+    line = SerialLine(baud=9_600)
+    line.a.send(50, b"ab")
+    assert [at_ps // PS_PER_US for at_ps, _ in line.a.withdraw(50)] == [50, 1_091]
+    assert (line.b.due_us, line.b.idle_us, line.a.room(50)) == (NEVER, NEVER, 4_096)
+
+
+# A change of the setting by the device, here the end a.
+
+
+def test_the_setting_that_a_line_has_is_no_change() -> None:
+    line, changes = SerialLine(), list[tuple[int, UartSetting]]()
+    line.a.uart.listeners.append(lambda since_us, setting: changes.append((since_us, setting)))
+    line.a.use_uart(10, UartSetting(115_200))
+    line.a.use_uart(20, UartSetting(9_600))
+    line.a.use_uart(30, UartSetting(9_600))
+    assert changes == [(20, UartSetting(9_600))]
+
+
+def test_a_byte_has_the_bits_of_the_new_setting() -> None:
+    line = SerialLine()
+    line.a.use_uart(0, UartSetting(1_000, parity="E"))
+    line.a.send(0, b"x")
+    assert line.b.idle_us == 11_000
+
+
+def test_bytes_with_another_setting_follow_those_on_the_line() -> None:
+    line = SerialLine(baud=9_600)
+    line.a.send(0, b"abc")
+    line.a.use_uart(0, UartSetting(19_200))
+    line.a.send(0, b"de")
+    assert [line.b.arrival_us(count) for count in (1, 3, 4, 5)] == [1_042, 3_125, 3_646, 4_167]
+    assert line.b.poll(1_042) == b"a"
+    assert [line.b.arrival_us(count) for count in (2, 3, 4)] == [3_125, 3_646, 4_167]
+
+
+def test_bytes_with_the_setting_of_those_on_the_line_lose_no_time() -> None:
+    line = SerialLine()
+    line.a.send(0, b"x")
+    line.a.use_uart(0, UartSetting(9_600))
+    line.a.use_uart(0, UartSetting(115_200))
+    line.a.send(0, bytes(35))
+    assert line.b.idle_us == 3_125  # 360 bits at 115 200 bit/s
+
+
+@pytest.mark.parametrize("changes", [[50_000], [50_000, 100_000]])
+def test_the_other_end_keeps_the_setting_until_the_device_has_sent_all(changes: list[int]) -> None:
+    line = SerialLine()
+    line.a.use_uart(1_000, UartSetting(10_000))
+    line.a.send(1_000, b"ab")
+    for baud in changes:
+        line.a.use_uart(1_000, UartSetting(baud))
+    line.b.send(2_000, b"x")
+    assert line.a.idle_us == 3_000  # 10 bits at 10 000 bit/s

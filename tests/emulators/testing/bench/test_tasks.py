@@ -76,6 +76,54 @@ def test_a_task_is_cancelled() -> None:
             task.result()
 
 
+def test_a_cancelled_body_is_closed() -> None:
+    closed: list[str] = []
+
+    async def body(bench: Bench) -> None:
+        try:
+            await bench.sleep("1s")
+        finally:
+            closed.append("closed")
+
+    with Bench(Rrc()) as bench:
+        bench.start(body(bench)).cancel()
+    assert closed == ["closed"]
+
+
+def test_the_end_of_the_sleep_of_a_cancelled_task_is_no_event() -> None:
+    async def body(bench: Bench) -> None:
+        bench.start(bench.sleep("1000s")).cancel()
+        await bench.until(lambda: False)
+
+    with Bench(Rrc()) as bench:
+        with pytest.raises(RuntimeError, match="nothing will ever happen"):
+            bench.run(body(bench))
+        assert bench.now_us < 10_000_000
+
+
+def test_a_check_raises_only_exceptions_that_nothing_has_read() -> None:
+    async def fail() -> None:
+        raise ValueError("it failed")
+
+    with Bench(Rrc()) as bench:
+        bench.start(bench.sleep("1s"))
+        bench.check_tasks()
+        task = bench.start(fail())
+        with pytest.raises(ValueError, match="it failed"):
+            bench.check_tasks()
+        bench.check_tasks()
+        with pytest.raises(ValueError, match="it failed"):
+            task.result()
+
+
+def test_a_traceback_ends_where_the_result_is_read() -> None:
+    with Bench(Rrc()) as bench:
+        task = bench.start(bench.sleep("1s"))
+        with pytest.raises(RuntimeError, match="not ended yet") as info:
+            task.result()
+    assert info.traceback.filter(info)[-1].path.name == "test_tasks.py"
+
+
 def test_a_task_that_has_not_ended_names_the_line_that_it_waits_for() -> None:
     async def body(bench: Bench) -> None:
         await bench.until(bench.on_line("OK:*", nth=3))
@@ -112,6 +160,20 @@ def test_what_never_comes_is_told() -> None:
         with pytest.raises(RuntimeError, match="nothing will ever happen"):
             bench.run(body(bench))
         assert bench.now_us < 10_000_000  # it ends with what happened last
+
+
+def test_a_day_counts_from_the_begin_of_the_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tasks.DAY_US == 24 * 3_600 * 1_000_000
+    for module in (tasks, virtual_mode):
+        monkeypatch.setattr(module, "DAY_US", 10_000_000)
+
+    async def body(bench: Bench) -> None:
+        await bench.until(lambda: False)
+
+    with Bench(Rrc()) as bench:
+        bench.run_for("6s")
+        with pytest.raises(RuntimeError, match="nothing will ever happen"):
+            bench.run(body(bench))
 
 
 def test_what_has_not_come_in_a_day_is_waited_for_no_longer(

@@ -117,6 +117,14 @@ def test_a_tpdo_is_taken_and_one_that_is_too_short_is_not() -> None:
     assert slave.sent == []
 
 
+def test_each_time_an_object_is_received_or_read_counts() -> None:
+    image = Slave(255).image
+    assert image.count(STATUSWORD) == 0
+    image.receive(0x182, bytes.fromhex("370608"))
+    image.learn(STATUSWORD, 0x0637)
+    assert image.count(STATUSWORD) == 2
+
+
 def test_the_objects_of_a_further_axis_are_800h_above() -> None:
     scripts: list[QueuedScript] = []
     settings = DriveSettings(DriveChannel("second"), axis=1)
