@@ -237,6 +237,13 @@ def test_a_guarded_slave_is_lost_each_time_it_falls_silent() -> None:
     assert told(desk) == [lost, "boot-up: received; booting again", lost]
 
 
+def test_the_events_of_a_slave_have_the_times_of_its_loss_and_its_return() -> None:
+    desk, _ = lost()
+    desk.at(200_000)
+    desk.at(250_000, "702#7F")
+    assert [at_us for at_us, _ in desk.nmt.slaves[2].events] == [51_000, 250_000]
+
+
 def test_a_guarded_slave_that_never_answers_is_lost_as_often_as_it_boots() -> None:
     desk = Desk(SlaveAssignment(2, guard_us=100_000, life_time_factor=3))
     desk.at(0)
