@@ -204,9 +204,9 @@ class PdoProducer(Service):
             Tpdo(self, index - _TPDO_PARAMETERS[0] + 1)
             for index in node.dictionary.within(_TPDO_PARAMETERS)
         ]
-        self._synchronous: tuple[pdo_parameters.TpdoMode, ...] = ()
-        self._timed: tuple[pdo_parameters.TpdoMode, ...] = ()
-        self._counters: tuple[int, ...] = ()
+        self._synchronous: tuple[pdo_parameters.TpdoMode, ...]
+        self._timed: tuple[pdo_parameters.TpdoMode, ...]
+        self._counters: tuple[int, ...]
         self._due_us = NEVER
         node.sync_handlers.append(self._sync)
 

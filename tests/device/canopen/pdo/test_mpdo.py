@@ -93,6 +93,12 @@ def test_the_application_writes_objects_of_others(dam: PdoBench) -> None:
     assert dam.step("185#R8") == []
 
 
+def test_the_first_of_two_tpdos_in_destination_address_mode_is_used(dam: PdoBench) -> None:
+    dam.must_write((0x1A01, 0, 0xFF), (0x1801, 1, NO_RTR | 0x285))
+    PdoProducer.of(dam.slave).send_to(9, 0x2000, 0, b"\1")
+    assert dam.step() == ["185#8900200001000000"]
+
+
 def test_more_than_four_bytes_are_refused(dam: PdoBench) -> None:
     with pytest.raises(FieldError, match="an MPDO carries 4"):
         PdoProducer.of(dam.slave).send_to(9, 0x2000, 1, bytes(5))

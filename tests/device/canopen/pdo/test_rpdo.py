@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.pdo_bench import OFF, PdoBench, u8
+from tests.device.canopen.pdo_bench import OFF, PdoBench, u8, u32
 from tests.device.canopen.reference import RO, RPDO, RW, STR, U16
 from tickrig.device.canopen.dictionary import Entry, SdoAbort
 from tickrig.device.canopen.pdo.rpdo import PdoConsumer
@@ -203,6 +203,34 @@ def test_the_earliest_deadline_counts(bench: PdoBench) -> None:
     assert bench.emergencies == ["8250 10 0100"]
 
 
+def test_a_later_deadline_does_not_delay_an_earlier_one(bench: PdoBench) -> None:
+    bench.set_rpdo1(1, (5, 50))
+    bench.must_write((0x1401, 5, 100))
+    bench.operational()
+    bench.step("205#0000", "305#0000000000000000")
+    bench.run(50)
+    assert bench.emergencies == ["8250 10 0100"]
+    bench.run(50)
+    assert bench.emergencies == ["8250 10 0200"]
+
+
+def test_a_deadline_of_before_a_reset_delays_none_after_it(bench: PdoBench) -> None:
+    def restart() -> None:
+        bench.set_rpdo1(255, (5, 100))
+        bench.operational()
+        bench.step("205#0000")
+
+    restart()
+    bench.run(90)
+    bench.step("000#8105")
+    bench.step()
+    restart()
+    bench.run(99)
+    assert bench.emergencies == []
+    bench.step()
+    assert bench.emergencies == ["8250 10 0100"]
+
+
 @pytest.mark.parametrize("ending", ["000#8005", "000#0205"])
 def test_leaving_operational_ends_the_deadline(bench: PdoBench, ending: str) -> None:
     bench.set_rpdo1(255, (5, 100))
@@ -246,6 +274,61 @@ def test_after_the_synchronous_window_a_synchronous_rpdo_is_thrown_away(bench: P
     bench.step("205#0202")
     bench.step("205#0303", "080#")
     assert outputs(bench) == (2, 2)
+
+
+def test_the_synchronous_window_may_be_a_power_on_value() -> None:
+    bench = PdoBench(u32(0x1007, 0, 5_000), without=[0x1007])
+    bench.set_rpdo1(1)
+    bench.operational()
+    bench.step("080#")
+    bench.run(5)
+    bench.step("205#0202")
+    bench.step("080#")
+    assert outputs(bench) == (0, 0)
+
+
+@pytest.mark.parametrize("command", ["000#8005", "000#0205", "000#8105", "000#8205"])
+def test_a_synchronous_window_ends_with_operational(bench: PdoBench, command: str) -> None:
+    bench.must_write((0x1007, 0, 5_000))
+    bench.set_rpdo1(1)
+    bench.operational()
+    bench.step("080#")
+    bench.run(10)
+    bench.step(command)
+    bench.must_write((0x1007, 0, 5_000))
+    bench.set_rpdo1(1)
+    bench.operational()
+    bench.step("205#0202")
+    bench.step("080#")
+    assert outputs(bench) == (2, 2)
+
+
+def test_a_sync_before_a_reset_opens_no_window_after_it(bench: PdoBench) -> None:
+    bench.must_write((0x1007, 0, 5_000))
+    bench.step("080#")
+    bench.run(10)
+    bench.step("000#8205")
+    bench.set_rpdo1(1)
+    bench.operational()
+    bench.step("205#0202")
+    bench.step("080#")
+    assert outputs(bench) == (2, 2)
+
+
+def test_a_sync_before_operational_hands_nothing_over(bench: PdoBench) -> None:
+    bench.set_rpdo1(1)
+    bench.step("205#0101", "080#")
+    bench.operational()
+    bench.step("080#")
+    assert outputs(bench) == (0, 0)
+
+
+def test_the_fourth_rpdo_has_the_fourth_parameters(bench: PdoBench) -> None:
+    bench.map(0x1603, 0x2000_0008)
+    bench.must_write((0x1403, 1, 0x505))
+    bench.operational()
+    bench.step("505#07")
+    assert bench.value(0x2000) == 7
 
 
 def test_without_the_object_there_is_no_window() -> None:

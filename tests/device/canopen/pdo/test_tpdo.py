@@ -116,6 +116,47 @@ def test_an_event_timer_below_the_inhibit_time_waits_for_it(bench: PdoBench) -> 
     assert [bench.run(100) for _ in range(3)] == [["185#0000"]] * 3
 
 
+def test_each_tpdo_has_its_own_event_timer() -> None:
+    bench = PdoBench()
+    bench.set_tpdo1(255, (5, 30))
+    bench.must_write((0x1801, 5, 50))
+    bench.operational()
+    sent = [(tick, frame[:3]) for tick in range(1, 101) for frame in bench.step()]
+    assert sent == [(30, "185"), (50, "285"), (60, "185"), (90, "185"), (100, "285")]
+
+
+def test_a_change_of_a_tpdo_delays_no_other(bench: PdoBench) -> None:
+    bench.set_tpdo1(255, (5, 30))
+    bench.operational()
+    bench.run(10)
+    bench.must_write((0x1801, 5, 500), (0x1801, 1, NO_RTR | 0x285))
+    assert bench.step() == ["285#0000000000000000"]
+    bench.must_write((0x1802, 1, NO_RTR | 0x385))
+    assert bench.run(18) == []
+    assert bench.step() == ["185#0000"]
+
+
+def test_the_fourth_tpdo_has_the_fourth_parameters(bench: PdoBench) -> None:
+    bench.map(0x1A03, 0x2000_0008)
+    bench.must_write((0x1803, 1, NO_RTR | 0x485))
+    assert bench.operational() == ["185#0000", "485#00"]
+    PdoProducer.of(bench.slave).request(4)
+    assert bench.step() == ["485#00"]
+
+
+def test_a_sync_of_before_a_stop_sends_nothing_after_it(bench: PdoBench) -> None:
+    bench.set_tpdo1(1)
+    bench.operational()
+    assert bench.step("080#", "000#0205", "000#0105") == []
+
+
+def test_who_makes_values_is_notified_when_a_tpdo_begins_to_watch_them(bench: PdoBench) -> None:
+    watched: list[str] = []
+    bench.slave.watch_handlers.append(lambda: watched.append("watched"))
+    bench.operational()
+    assert watched == ["watched"]
+
+
 def test_type_0_is_sent_with_the_sync_after_a_change(bench: PdoBench) -> None:
     bench.set_tpdo1(0)
     assert bench.operational() == []
