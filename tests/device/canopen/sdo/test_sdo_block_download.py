@@ -76,6 +76,46 @@ def test_a_segment_that_comes_twice_counts_once() -> None:
     assert bus.step(END) == ENDED
 
 
+def test_segments_that_come_again_later_count_once() -> None:
+    bus = booted()
+    bus.step(BEGIN)
+    bus.step(*SEGMENTS[:2])
+    assert bus.step(*SEGMENTS) == ["585#A2057F0000000000"]
+    assert bus.step(END) == ENDED
+    assert bus.slave.dictionary[0x2007, 0].data == TEXT
+
+
+def test_a_segment_that_is_dropped_restarts_the_time_out() -> None:
+    bus = booted()
+    bus.step(BEGIN)
+    assert bus.run(3_000) == []
+    bus.step(SEGMENTS[1])
+    assert bus.run(4_999) == []
+    assert bus.step() == ["585#8007200000000405"]
+
+
+def test_after_its_end_no_transfer_runs() -> None:
+    bus = booted()
+    bus.step(BEGIN, *SEGMENTS)
+    assert bus.step(END) == ENDED
+    assert bus.step(END) == ["585#8000000001000405"]
+    assert bus.run(6_000) == []
+
+
+def test_reserved_bytes_behind_the_crc_are_ignored() -> None:
+    bus = booted()
+    bus.step(BEGIN, *SEGMENTS)
+    assert bus.step("605#D54569FFFFFFFFFF") == ENDED
+
+
+def test_too_many_bytes_are_refused_at_the_end_of_the_block() -> None:
+    bus = booted()
+    client = Client(bus)
+    client.ask(BlockDownloadInitiateRequest(0x2007, 0, crc=True, size=None))
+    block = [BlockSegment(number, b"7 bytes", last=False) for number in range(1, 128)]
+    assert client.ask(*block) == Abort(0x2007, 0, AbortCode.TOO_LONG)
+
+
 def test_a_client_may_be_slow_inside_a_block() -> None:
     bus = booted()
     bus.step(BEGIN)

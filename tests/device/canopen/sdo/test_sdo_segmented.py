@@ -6,6 +6,7 @@ from tests.device.canopen.sdo_client import Client, booted, pattern
 from tests.device.canopen.slave_bench import Bus
 from tickrig.wire.canopen.sdo import Abort, DownloadSegmentResponse
 from tickrig.wire.canopen.sdo_frame import AbortCode
+from tickrig.wire.instant import NEVER
 
 READ_STATUS = "605#4001100000000000"
 STATUS = ["585#4F01100000000000"]
@@ -36,6 +37,55 @@ def test_an_empty_value_is_one_empty_segment() -> None:
         ("6000000000000000", "0F00000000000000"),
         ("7000000000000000", "8000000001000405"),
     )
+
+
+def test_a_full_segment_can_be_the_last() -> None:
+    bus = booted()
+    bus.slave.dictionary[0x2007, 0].value = "7 bytes"
+    dialogue(
+        bus,
+        ("4007200000000000", "4107200007000000"),
+        ("6000000000000000", "0137206279746573"),
+    )
+
+
+def test_after_the_last_segment_of_a_download_no_transfer_runs() -> None:
+    bus = booted()
+    dialogue(
+        bus,
+        ("2107200005000000", "6007200000000000"),
+        ("0561626364650000", "2000000000000000"),
+        ("1561626364650000", "8000000001000405"),
+    )
+    assert bus.run(6_000) == []
+
+
+def test_each_segment_restarts_the_time_out() -> None:
+    bus = booted()
+    bus.step("605#2107200010000000")
+    for number in range(2):
+        assert bus.run(3_000) == []
+        bus.step(f"605#{16 * number:02X}61626364656667")
+    assert bus.run(4_999) == []
+    assert bus.step() == ["585#8007200000000405"]
+
+
+def test_after_a_time_out_nothing_is_due() -> None:
+    bus = booted()
+    bus.step("605#2107200010000000")
+    assert bus.run(5_000) == ["585#8007200000000405"]
+    assert bus.slave.due_us == NEVER
+
+
+def test_a_transfer_of_before_a_reset_delays_no_time_out_after_it() -> None:
+    bus = booted()
+    bus.step("605#2107200010000000")
+    bus.run(1_000)
+    assert bus.step("000#8105") == ["705#00"]
+    bus.step("605#2107200010000000")
+    assert bus.run(4_999) == []
+    assert bus.step() == ["585#8007200000000405"]
+    assert bus.run(5_000) == []
 
 
 @pytest.mark.parametrize("request_", ["6000000000000000", "7000000000000000", "0000000000000000"])

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.objects import make_bus, u32
+from tests.device.canopen.objects import array, make_bus, u32
 from tests.device.canopen.reference import make_dictionary
 from tests.device.canopen.sdo_client import OPEN_SECOND, booted
 from tickrig.device.canopen.stack import make_slave
@@ -28,6 +28,22 @@ def test_1200h_tells_the_truth_whatever_the_eds_says() -> None:
     assert bus.step("67F#4000120100000000") == ["5FF#430012017F060000"]
     assert bus.step("67F#4000120200000000") == ["5FF#43001202FF050000"]
     assert bus.step("67F#2300120101060000") == ["5FF#8000120102000106"]
+
+
+def test_an_object_whose_values_are_made_later_is_asked_for_them() -> None:
+    bus = make_bus(u32(0x2000, 7))
+    bus.step()
+    for _ in range(3):
+        assert bus.step("605#4000200000000000") == ["585#4300200007000000"]
+    bus.slave.dictionary[0x2000, 0].source = lambda entry: bytes([9, 0, 0, 0])
+    assert bus.step("605#4000200000000000") == ["585#4300200009000000"]
+
+
+@pytest.mark.parametrize(("index", "served"), [(0x127F, True), (0x1280, False)])
+def test_the_last_server_is_127fh(index: int, served: bool) -> None:
+    bus = make_bus(u32(0x1000, 7), array(index, 0x6A0, 0x6A1))
+    bus.step()
+    assert bus.step(f"6A0#{READ_TYPE}") == (["6A1#4300100007000000"] if served else [])
 
 
 def test_1200h_of_another_type_is_left_alone() -> None:
