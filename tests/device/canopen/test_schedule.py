@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -70,6 +72,17 @@ def test_services_that_are_due_in_one_tick_are_all_run(bus: Bus) -> None:
     second.schedule(2_000)
     bus.step()
     assert (first.runs, second.runs) == ([2_000], [2_000])
+
+
+def test_a_service_that_asks_often_takes_no_more_memory(bus: Bus) -> None:
+    sizes: list[int] = []
+    for _ in range(2):
+        for _ in range(100):
+            bus.slave.schedule(1, bus.now_us)
+            bus.step()
+        First.of(bus.slave).runs.clear()
+        sizes.append(len(pickle.dumps(bus.slave)))
+    assert sizes[1] < sizes[0] + 20
 
 
 def test_power_that_is_cut_in_a_tick_is_off_after_it(bus: Bus) -> None:
