@@ -35,3 +35,10 @@ def test_a_full_bus_is_one_span_and_old_ones_are_forgotten() -> None:
 
 def test_no_time_has_no_share() -> None:
     assert BusyTime().permille(5, 5, (0, 0)) == 0
+
+
+def test_the_latest_32_768_spans_are_kept() -> None:
+    busy, spans = BusyTime(), 32_768
+    for at in range(0, 2 * (spans + 2), 2):
+        busy.note(at + 1, at + 2)
+    assert busy.permille(0, 2 * (spans + 1), (0, 0)) == 499

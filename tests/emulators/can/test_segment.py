@@ -10,7 +10,7 @@ from tests.emulators.can.can_bench import Log, frames
 from tests.emulators.can.test_errors import ACTIVE, BUS_OFF, bus_off, counters
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
-from tickrig.wire.can import BIT_ERROR, NO_ACK, ErrorState, frame_bits
+from tickrig.wire.can import BIT_ERROR, NO_ACK, CanFrame, ErrorState, frame_bits
 from tickrig.wire.instant import NEVER
 
 RETURN_BITS = 128 * 11
@@ -351,3 +351,186 @@ def test_of_two_that_sent_the_same_unheard_the_passive_one_acknowledges_the_othe
     wire.advance(1_000_000)
     assert log.text == f"{NO_ACK} 7E4#00 7E4#00"
     assert (first.poll(1_000_000), second.poll(1_000_000)) == (frames("7E4#00"),) * 2
+
+
+# A node that is forced off the bus, as by the fault `bus_off`.
+
+
+def test_a_node_that_is_forced_off_is_bus_off_at_once() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.run_to(100)
+    play.wire.force_off(play.ends[0])
+    assert play.states == [(100, BUS_OFF)]
+    play.send(100, 0, "185#")
+    play.send(100, 1, "285#")
+    play.run_to(10_000)
+    assert play.log.text == "285#"
+
+
+@pytest.mark.parametrize("bit_rate", [1_000_000, 800_000])
+def test_a_frame_of_a_node_that_is_forced_off_is_aborted(bit_rate: int) -> None:
+    play = Play(bit_rate, nodes=3)
+    play.send(0, 0, "185#0102")
+    play.send(0, 1, "285#")
+    play.run_to(40)
+    play.wire.force_off(play.ends[0])
+    play.run_to(10_000)
+    # two error flags, the error delimiter and the pause between frames
+    end = 40 + 6 + 6 + 8 + 3 + bits("285#") - 3
+    assert play.log.lines == [f"{-(-end * 1_000_000 // bit_rate)} 285#"]
+
+
+def test_a_node_that_is_forced_off_before_its_first_bit_breaks_nothing() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.wire.faults.arm("delay", "1")
+    play.send(0, 0, "185#")
+    play.wire.faults.clear("delay")
+    play.run_to(100)
+    play.wire.force_off(play.ends[0])
+    play.send(100, 1, "285#")
+    play.run_to(1_000)
+    assert play.log.lines == [f"{100 + bits('285#') - 3} 285#"]
+
+
+def test_a_node_that_was_forced_off_sends_again_after_its_return() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.wire.force_off(play.ends[0])
+    play.wire.release(play.ends[0])
+    play.run_to(RETURN_BITS + 100)
+    play.wire.faults.arm("delay", "1")
+    play.send(RETURN_BITS + 100, 0, "185#")
+    play.run_to(20_000)
+    assert [state for _, state in play.states] == [BUS_OFF, ACTIVE]
+    assert play.log.text == "185#"
+
+
+def test_a_frame_of_another_node_goes_on_when_a_node_is_forced_off() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.send(0, 1, "285#")
+    play.run_to(30)
+    play.wire.force_off(play.ends[0])
+    play.run_to(10_000)
+    assert play.log.lines == [f"{bits('285#') - 3} 285#"]
+
+
+def test_a_frame_that_waits_is_not_sent_by_a_node_that_is_forced_off() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.send(0, 1, "285#")
+    play.send(10, 0, "185#")
+    play.wire.force_off(play.ends[0])
+    play.run_to(10_000)
+    assert play.log.text == "285#"
+
+
+# Where two frames of one identifier differ.
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "differ"),
+    [
+        ("185#8002", "185#8102", 19 + 7),
+        ("00000185#0002", "00000185#0102", 39 + 7),
+        ("00000185#00", "00000185#0000", 39),
+    ],
+)
+def test_a_collision_is_at_the_first_bit_that_differs(first: str, second: str, differ: int) -> None:
+    play = Play(1_000_000, nodes=3)
+    play.send(0, 0, first)
+    play.send(0, 1, second)
+    play.run_to(100)
+    assert play.log.times_us[0] == differ + 6 + 6 + 8
+
+
+def test_a_frame_does_not_start_before_it_is_sent_while_another_is_delayed() -> None:
+    play = Play(1_000_000, nodes=3)
+    play.wire.faults.arm("delay", "1")
+    play.send(0, 0, "185#")
+    play.wire.faults.clear("delay")
+    play.send(500, 1, "285#")
+    play.run_to(20_000)
+    assert play.log.lines == [f"{500 + bits('285#') - 3} 285#", f"{10_000 + bits('185#') - 3} 185#"]
+
+
+def test_a_segment_is_whole_while_all_ends_are_on_it() -> None:
+    play = Play(1_000_000, nodes=2)
+    seen = [play.wire.bus.whole]
+    play.wire.disconnect(play.ends[0])
+    seen.append(play.wire.bus.whole)
+    play.wire.reconnect(play.ends[0])
+    assert [*seen, play.wire.bus.whole] == [True, False, True]
+
+
+@pytest.mark.parametrize("fault", ["", "drop"])
+def test_a_frame_counts_once_for_the_load(fault: str) -> None:
+    play = Play(1_000_000, nodes=2)
+    if fault:
+        play.wire.faults.arm(fault, str(2.0**-80))
+    play.send(0, 0, "185#")
+    play.run_to(1_000)
+    assert play.wire.load_permille() == bits("185#")
+
+
+def test_who_listens_to_faults_hears_the_frames_that_are_dropped() -> None:
+    play, dropped = Play(1_000_000, nodes=2), list[str]()
+    play.wire.faults.listeners.append(lambda at_us, frame: dropped.append(f"{at_us} {frame}"))
+    play.wire.faults.arm("drop", "1")
+    play.send(0, 0, "185#")
+    play.run_to(1_000)
+    assert dropped == [f"{bits('185#') - 3} 185#"]
+
+
+def test_the_routes_of_4096_identifiers_are_kept() -> None:
+    wire = CanWire()
+    sizes: list[int] = []
+    for can_id in range(4_098):
+        wire.bus.routes.receivers(CanFrame(can_id, extended=True))
+        sizes.append(len(wire.bus.routes._table))
+    assert sizes[4_094:] == [4_095, 4_096, 1, 2]
+
+
+def test_an_earlier_event_is_announced_once_until_the_bus_is_idle() -> None:
+    play, announced = Play(1_000_000, nodes=3), list[int]()
+    assert play.wire.due_us == NEVER
+    play.wire.on_traffic.append(lambda: announced.append(1))
+    for end in (2, 1, 0):
+        play.send(0, end, f"{end + 1}85#")
+        assert play.wire.due_us < NEVER
+    assert len(announced) == 1
+
+
+# What the kernel reads and sets.
+
+
+def test_the_fields_that_the_kernel_reads_have_values_from_the_start() -> None:
+    bus = CanWire().bus
+    assert (bus._on_bus, bus._free, bus._start, bus._due_us) == (0, 0, NEVER, NEVER)
+    assert (bus._sound, bus._announced, bus._finish, bus.received) == (False, False, None, False)
+
+
+def test_another_end_ends_the_sound_state() -> None:
+    wire = CanWire()
+    wire.bus._sound = True
+    wire.end()
+    assert not wire.bus._sound
+
+
+def delay_a_frame(play: Play) -> None:
+    play.wire.faults.arm("delay", "1")
+    play.send(0, 0, "185#")
+    play.wire.faults.clear("delay")
+
+
+def is_sound(act: Callable[[Play], object] = lambda _: None, nodes: int = 2) -> bool:
+    play = Play(1_000_000, nodes)
+    act(play)
+    return play.wire.bus._is_sound()
+
+
+def test_a_bus_is_sound_while_nothing_can_go_wrong() -> None:
+    assert is_sound()
+    assert is_sound(nodes=3)
+    assert not is_sound(nodes=1)
+    assert not is_sound(lambda play: play.wire.faults.arm("drop", "0.5"))
+    assert not is_sound(lambda play: play.wire.faults.arm("short"))
+    assert not is_sound(delay_a_frame)
+    assert not is_sound(lambda play: make_passive(play.wire, play.ends[0]), nodes=3)
