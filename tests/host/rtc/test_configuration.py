@@ -193,3 +193,10 @@ def test_a_listener_that_raises_brings_its_component_into_error() -> None:
     component.configuration.set("int_param0", "5")
     manager.run_for(2 * PERIOD_US)
     assert manager.state_of("ConfigSample0") is LifeCycleState.ERROR
+
+
+def test_a_value_that_is_set_before_initialize_counts_from_there() -> None:
+    sample = ConfigSample("ConfigSample0")
+    sample.configuration.set("int_param0", "7")
+    sample.initialize()
+    assert sample.int_param0.value == 7

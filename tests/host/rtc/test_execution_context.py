@@ -124,6 +124,22 @@ def test_a_component_is_removed_unless_it_is_active(state: str, code: ReturnCode
     assert (bench.ec in bench.spy.contexts) is (code is not OK)
 
 
+def test_a_component_that_was_removed_may_be_added_again() -> None:
+    bench = Bench()
+    bench.ec.remove_component(bench.spy)
+    assert bench.ec.add_component(bench.spy) is OK
+    assert bench.ec.components == (bench.spy,)
+
+
+def test_a_rate_whose_period_is_not_allowed_is_refused() -> None:
+    ec = ExecutionContext(100.0)
+    ec.allows_period = lambda period_us: period_us % 1_000 == 0
+    assert ec.set_rate(3_000.0) is ReturnCode.BAD_PARAMETER
+    assert ec.rate_hz == 100.0
+    assert ec.set_rate(500.0) is OK
+    assert ec.period_us == 2_000
+
+
 def test_an_active_component_is_released_with_its_callback() -> None:
     bench = Bench()
     bench.bring("ACTIVE")

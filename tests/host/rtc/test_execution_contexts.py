@@ -59,3 +59,18 @@ def test_together_as_each_by_itself(steps: list[tuple[str, int, int]]) -> None:
         assert group.due_us == min((alone[m].due_us for m in members), default=NEVER)
         assert [c.now_us for c in grouped] == [c.now_us for c in alone]
         assert [c.due_us for c in grouped] == [c.due_us for c in alone]
+
+
+def test_a_group_is_due_with_the_contexts_that_run_in_it() -> None:
+    group, context = ExecutionContexts(), ExecutionContext()
+    context.start()
+    group.tick(5_000)
+    due_us = [group.due_us]
+    group.add(context, 5_000)
+    due_us.append(group.due_us)
+    context.stop()
+    due_us.append(group.due_us)
+    context.start()
+    due_us.append(group.due_us)
+    group.remove(context)
+    assert [*due_us, group.due_us] == [NEVER, 6_000, NEVER, 6_000, NEVER]

@@ -10,8 +10,8 @@ import logging
 
 import pytest
 
-from tests.host.rtc.spy import ERROR, OK, PERIOD_US, Bench, BrokenError, Spy
-from tickrig.host.rtc import ExecutionContext, LifeCycleState, ReturnCode
+from tests.host.rtc.spy import CALLBACKS, ERROR, OK, PERIOD_US, Bench, BrokenError, Spy
+from tickrig.host.rtc import ExecutionContext, LifeCycleState, ReturnCode, RtComponent
 
 OPERATIONS = ("activate", "deactivate", "reset", "abort", "none")
 WORK = {
@@ -243,6 +243,15 @@ def test_who_listens_learns_how_each_move_ended(
     assert [name for name, _ in seen[len(moved) :]] == ["CREATED"]
 
 
+@pytest.mark.parametrize("code", [OK, ERROR])
+def test_who_listens_learns_how_a_component_left(code: ReturnCode) -> None:
+    bench, seen = Bench(on_deactivated=code), list[tuple[str, ReturnCode]]()
+    bench.bring("ACTIVE")
+    bench.ec.on_move.append(lambda component, now, code: seen.append((now.name, code)))
+    bench.ec.release_component(bench.spy)
+    assert seen == [("CREATED", code)]
+
+
 def test_a_listener_of_moves_that_raises_is_logged_and_stops_nobody(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -251,6 +260,16 @@ def test_a_listener_of_moves_that_raises_is_logged_and_stops_nobody(
     bench.bring("ACTIVE")
     assert bench.period() == ["on_execute", "on_state_update"]
     assert [record.getMessage() for record in caplog.records] == ["Spy0: a listener raised"]
+
+
+@pytest.mark.parametrize("name", [name for name in CALLBACKS if name.endswith("ize")])
+def test_a_callback_that_is_not_overridden_succeeds(name: str) -> None:
+    assert getattr(RtComponent("Plain0"), name)() is OK
+
+
+@pytest.mark.parametrize("name", [name for name in CALLBACKS if not name.endswith("ize")])
+def test_a_callback_of_a_context_that_is_not_overridden_succeeds(name: str) -> None:
+    assert getattr(RtComponent("Plain0"), name)(ExecutionContext()) is OK
 
 
 def test_initialize_only_from_created() -> None:
@@ -311,6 +330,19 @@ def test_exit_leaves_active_stops_and_finalizes(state: str, calls: str) -> None:
     assert bench.spy.taken() == calls.split()
     assert (bench.ec.running, bench.ec.components, bench.spy.contexts) == (False, (), [])
     assert bench.spy.exit() is ReturnCode.PRECONDITION_NOT_MET
+
+
+def test_a_component_that_has_exited_owns_no_context() -> None:
+    bench = Bench()
+    bench.spy.exit()
+    assert bench.spy.own_contexts == []
+
+
+def test_exit_in_created_changes_nothing() -> None:
+    spy, ec = Spy(), ExecutionContext()
+    spy.own(ec)
+    assert spy.exit() is ReturnCode.PRECONDITION_NOT_MET
+    assert (spy.own_contexts, ec.components) == ([ec], (spy,))
 
 
 def test_exit_leaves_a_context_of_others_running() -> None:
