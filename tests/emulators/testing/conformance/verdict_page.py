@@ -29,11 +29,11 @@ This page lists the results of [`canmon conform --intrusive`](conform.md) for ou
 stacks of other projects, in virtual time. `tools/conform-stacks` writes the page. With the same
 versions of all programs, the page is always the same.
 
-A verdict is about one program that uses a stack, and not about the stack alone. The programs of
-this page have those objects of our reference slave R1 that the stack supports. They move inputs and
-raise errors as far as the stack allows it, and do nothing else. For example, a stack may leave it
-to the application which values an object has after a reset. The check of these values then fails
-on this page, but a device with the same stack may pass it.
+A verdict is about one program that uses a stack, and not about the stack alone. Each program on
+this page has those objects of our reference slave R1 that its stack supports. The program moves
+inputs and raises errors as far as the stack allows it, and does nothing else. For example, a stack
+may leave it to the application which values an object has after a reset. The check of these values
+then fails on this page, but a device with the same stack may pass it.
 
 """
 BY_HAND: Final = """## CANopenNode and Lely
@@ -98,13 +98,13 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     yield f"## {name}\n"
     yield (
         f"Another tester has verdicts for {len(read_table(stack)) - 1} of the checks."
-        f" {found.both} of the checks have a verdict from both testers,"
-        f" and {found.same} of these verdicts are the same."
+        f" Both testers give a verdict for {found.both} checks,"
+        f" and in {found.same} of these checks the two verdicts are the same."
     )
     if found.differences:
         yield "\nThe two testers differ in these checks:\n"
     for one in found.differences:
-        yield f"- {one.check_id}: the other tester has {one.public}, our tester has {one.here}."
+        yield f"- {one.check_id}: the other tester reports {one.public}, our tester {one.here}."
         if one.reason:
             yield f"  The reason: {one.reason}."
     failed = [one for one in report.results if one.outcome.verdict is CheckVerdict.FAIL]
