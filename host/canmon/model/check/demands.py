@@ -3,18 +3,116 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, TransferOutcome
-from tickrig.host.canmon.model.decode.filter import Test, signal_reader
-from tickrig.host.canmon.model.frames import ERROR, Record, any_ident, ms_text
+from tickrig.host.canmon.model.decode.filter import Test, signal_place, signal_reader
+from tickrig.host.canmon.model.frames import ERROR, AnyRecord, Record, any_ident, ms_text
 from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.instant import NEVER
 
 # The events of a rule.
+
+_Sender = tuple[str, int]
+"""A bus, and an identifier on this bus."""
+
+
+def _sender_of(record: Record) -> _Sender:
+    """Return the sender of a frame. All error frames have the same sender."""
+    frame = record.frame
+    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
+
+
+EVENT_SIGNALS: Final = frozenset(["code", "register", "command", "class", "days", "ms"])
+"""Signals of EMCY, NMT, LSS, TIME and error frames.
+
+Their names are known even if none of these frames came.
+"""
+_EVENT_KINDS: Final = frozenset(["emcy", "nmt", "lss", "time", "error"])
+"""Kinds of frames of which each is an event of its own, although it has the same values again."""
+
+
+class AtFrames:
+    """Test of signals at certain frames, as `tpdo1 and 3.statusword.fault` has it.
+
+    If a frame does not contain a signal, its latest value on the bus counts. The values of
+    `EVENT_SIGNALS` count only in their own frames. The test must see all frames.
+
+    Args:
+        frames: tests that select the frames.
+        states: tests of signals, each with the names of its signals.
+        each: whether each frame is an event. If not, the tests only select senders, and the frame
+            must contain the signals.
+    """
+
+    def __init__(
+        self, frames: Iterable[Test], states: Iterable[tuple[Test, Collection[str]]], *, each: bool
+    ) -> None:
+        self._frames, self.each = tuple(frames), each
+        self._states = tuple((test, _SignalState(paths, kept=each)) for test, paths in states)
+
+    def select(self, test: Test) -> None:
+        """Restrict the selected frames to those that pass a test."""
+        self._frames = (*self._frames, test)
+
+    def __call__(self, record: AnyRecord, decoded: Decoded) -> bool:
+        """Return whether a frame is selected and the tests of signals hold at it."""
+        return self.state(record, decoded) is True
+
+    def state(self, record: AnyRecord, decoded: Decoded) -> bool | None:
+        """Return whether the tests of signals hold at a frame.
+
+        The result is None if the frame is not selected, or if a value is unknown.
+        """
+        if not isinstance(record, Record):
+            return None
+        states = [state.at(test, record, decoded) for test, state in self._states]
+        if not all(test(record, decoded) for test in self._frames) or None in states:
+            return None
+        return all(states)
+
+
+class _SignalState:
+    """The latest result of a test of signals on each bus, and of each node on it.
+
+    Args:
+        paths: names of the signals.
+        kept: whether a result counts until the next one, or only for its own frame.
+    """
+
+    def __init__(self, paths: Collection[str], *, kept: bool) -> None:
+        places = [signal_place(path) for path in paths]
+        self._finders = [signal_reader(path) for path in paths]
+        self._kept = kept and not any(map(is_event_signal, paths))
+        self._own = any(node is None and " " not in name for node, name, _ in places)
+        self._latest: dict[tuple[str, int | None], tuple[bool, _Sender]] = {}
+
+    def at(self, test: Test, record: Record, decoded: Decoded) -> bool | None:
+        """Return the result of the test at a frame, or None if it is unknown."""
+        channel, node = record.channel, decoded.node
+        if any(find(decoded) is not None for find in self._finders):
+            found = test(record, decoded)
+            if self._kept:
+                kept = found, _sender_of(record)
+                self._latest[channel, None] = self._latest[channel, node] = kept
+            return found
+        latest = self._latest.get((channel, node if self._own else None))
+        if latest is None or latest[1] == _sender_of(record):  # a frame that is cut short
+            return None
+        return latest[0]
+
+
+def is_event_signal(path: str) -> bool:
+    """Return whether a signal is one of `EVENT_SIGNALS`, or a bit of it.
+
+    >>> is_event_signal("5.code"), is_event_signal("register.2"), is_event_signal("speed")
+    (True, True, False)
+    """
+    name, _, bit = signal_place(path)[1].partition(".")
+    return name in EVENT_SIGNALS and (not bit or bit.isdecimal())
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +125,10 @@ class RuleEvent:
         paths: names of the signals in the filter.
         is_signal: whether the filter is only the name of a signal, without a comparison.
         has_node: whether the filter contains a node-ID.
+        at_frames: test of the part of the filter that selects frames, as in `emcy and code = 0`, or
+            None if the filter consists of signals, or of parts joined by `or`.
+        alone: test of the parts without signals, in a filter that joins them with signals by `or`,
+            as in `emcy or statusword.fault`, otherwise None.
     """
 
     text: str
@@ -34,6 +136,8 @@ class RuleEvent:
     paths: tuple[str, ...] = ()
     is_signal: bool = False
     has_node: bool = False
+    at_frames: AtFrames | None = None
+    alone: Test | None = None
 
     def carriers(self) -> Callable[[Decoded], bool]:
         """Return a function that returns whether a frame contains one of the named signals."""
@@ -56,15 +160,6 @@ class RuleEvent:
 
 
 EVERY: Final = RuleEvent("all frames", lambda record, decoded: True)
-
-_Sender = tuple[str, int]
-"""A bus, and an identifier on this bus."""
-
-
-def _sender_of(record: Record) -> _Sender:
-    """Return the sender of a frame. All error frames have the same sender."""
-    frame = record.frame
-    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
 
 
 def _said(decoded: Decoded) -> str:
@@ -119,6 +214,9 @@ class RuleDemand:
     def pause(self) -> None:
         """Stop the demand until `begin`."""
 
+    def watch(self, record: Record, decoded: Decoded) -> None:
+        """Process a frame that is not judged, because the rule does not apply now."""
+
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Return the violation in a frame."""
         return None
@@ -147,7 +245,9 @@ MOST_COUNTED: Final = 10_000
 class Truth(RuleDemand):
     """Demand that a condition on signals is always true, or that it is never true.
 
-    A violation is reported when it begins. It is not reported again while it lasts.
+    A violation is reported when it begins. It is not reported again while it lasts. But each EMCY,
+    NMT, LSS, TIME and error frame is reported, and each selected frame that does not contain the
+    signals itself, as in `tpdo1 of 3 and node 3 stopped`.
 
     Args:
         event: condition on signals, such as `position > 100`.
@@ -156,25 +256,47 @@ class Truth(RuleDemand):
 
     def __init__(self, event: RuleEvent, wanted: bool) -> None:
         self._matches, self._carries, self._wanted = event.matches, event.carriers(), wanted
-        self._wrong: set[_Sender] = set()
+        self._at_frames, self._wrong = event.at_frames, set[_Sender]()
+        self._each = self._at_frames is not None and self._at_frames.each
+        self._alone = None if wanted else event.alone
+        # without the event, too, it is judged: misspelt signals are reported by the rule
+        forbids_frames = not wanted and (self._each or event.alone is not None)
+        self._proves = forbids_frames or all(map(is_event_signal, event.paths))
         self.doubt = f"nothing with {event.text} came while it was in force"
 
     def pause(self) -> None:
         """Allow the violation to be reported again."""
         self._wrong.clear()
 
+    def watch(self, record: Record, decoded: Decoded) -> None:
+        """Keep the values of signals for the time when the demand applies again."""
+        if self._at_frames is not None:
+            self._at_frames.state(record, decoded)
+
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the condition with its required value."""
-        if not self._carries(decoded):
+        self.judged |= self._proves
+        if self._alone is not None and self._alone(record, decoded):
+            self.judged = True
+            return _said(decoded)
+        if self._at_frames is not None:
+            holds = self._at_frames.state(record, decoded)
+        else:
+            holds = self._matches(record, decoded) if self._carries(decoded) else None
+        if holds is None:
             return None
         self.judged = True
         sender = _sender_of(record)
-        if self._matches(record, decoded) is self._wanted:
+        if holds is self._wanted:
             self._wrong.discard(sender)
-        elif sender not in self._wrong:
+        elif sender not in self._wrong or self._is_event(decoded):
             self._wrong.add(sender)
             return _said(decoded)
         return None
+
+    def _is_event(self, decoded: Decoded) -> bool:
+        """Return whether a frame is reported again, which is not a sample of the condition."""
+        return decoded.kind in _EVENT_KINDS or (self._each and not self._carries(decoded))
 
 
 class Never(RuleDemand):
@@ -612,9 +734,9 @@ _EMCY: Final = "emcy"
 class In(RuleDemand):
     """Demand that a value belongs to a set of valid values.
 
-    If the event is a signal, a violation is reported when it begins. For other events, each frame
-    with an invalid value is reported. An EMCY with error code 0000h is always valid, because it
-    reports that an error is gone.
+    If the event is a signal, a violation is reported when it begins. For other events, and for the
+    signals of an EMCY, NMT, LSS, TIME or error frame, each frame with an invalid value is reported.
+    An EMCY with error code 0000h is always valid, because it reports that an error is gone.
 
     Args:
         event: name of a signal, or event that selects frames. Of a selected frame, the first value
@@ -628,6 +750,7 @@ class In(RuleDemand):
         self._values, self._holds = values, holds
         self.doubt = f"no value of {event.text} came while it was in force"
         self._wrong: set[_Sender] = set()
+        self._proves = self._once and all(map(is_event_signal, event.paths))
 
     def pause(self) -> None:
         """Allow the violation to be reported again."""
@@ -635,6 +758,7 @@ class In(RuleDemand):
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the value with the valid values."""
+        self.judged |= self._proves
         signal = self._value_of(record, decoded)
         if signal is None:
             return None
@@ -643,7 +767,7 @@ class In(RuleDemand):
         if self._holds(signal) or (decoded.kind == _EMCY and not signal.value):
             self._wrong.discard(sender)
             return None
-        if self._once and sender in self._wrong:
+        if self._once and sender in self._wrong and decoded.kind not in _EVENT_KINDS:
             return None
         self._wrong.add(sender)
         return f"{_said(decoded)}; {self._event.text} in {self._values} is right"

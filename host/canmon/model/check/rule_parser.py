@@ -215,6 +215,7 @@ class ExpressionRule:
             self._look(record, decoded)
         # without a scope nothing is called while it runs, which saves a third of the time of a rule
         if (self._scopes or not self._running) and not self._in_force(record, decoded):
+            self._demand.watch(record, decoded)
             return None
         text = self._demand.judge(record, decoded)
         if not text:
@@ -487,7 +488,7 @@ def errors_alone(
 
     A rule such as `emcy never` should match only errors, and such an EMCY reports that an error is
     gone. The test is returned unchanged if the filter does not contain the word `emcy`, contains
-    `not`, or names a signal, as in `emcy and code = 0`.
+    `not`, or names a signal of the EMCY, as in `emcy and code = 0`.
 
     Args:
         test: function that returns whether a frame passes the filter.
@@ -495,7 +496,7 @@ def errors_alone(
         signals: names of the signals in the filter.
     """
     words = {token.text for token in tokens}
-    if signals or _EMCY not in words or words & _OTHERS:
+    if any(map(demands.is_event_signal, signals)) or _EMCY not in words or words & _OTHERS:
         return test
     return lambda record, decoded: test(record, decoded) and not _is_reset(decoded)
 
@@ -503,6 +504,19 @@ def errors_alone(
 def _is_reset(decoded: Decoded) -> bool:
     return decoded.kind == _EMCY and bool(decoded.signals) and not decoded.signals[0].value
 
+
+def _any_of(tests: Sequence[filters.Test]) -> filters.Test:
+    return lambda record, decoded: any(test(record, decoded) for test in tests)
+
+
+def _all_of(tests: Sequence[filters.Test]) -> filters.Test:
+    if len(tests) == 1:
+        return tests[0]
+    return lambda record, decoded: all(test(record, decoded) for test in tests)
+
+
+_NO_EVENT: Final = ("node", "channel", "ch", "dir", "src", "dlc", "bytes", "not", "!")
+"""First words of terms that only restrict frames, so that a frame is not an event by them."""
 
 DEMANDS: Final = (
     *("never", "always", "once", "at most", "at least", "in", "every", "within", "to"),
@@ -558,6 +572,8 @@ class _RuleParser(_QuantityParser):
         Raise RuleError if the text is not a rule.
         """
         self._named: set[str] = set()
+        self._at_frames: demands.AtFrames | None = None
+        self._alone: filters.Test | None = None
         demand = self._demand(self._subject())
         scopes = []
         while word := self._take_one(*SCOPES):
@@ -585,11 +601,52 @@ class _RuleParser(_QuantityParser):
         self._tokens.insert(0, word)
         return nodes
 
+    def _or(self) -> filters.Test:
+        tests, alone = list[filters.Test](), list[filters.Test]()
+        outer, self._signals, named = self._signals, set(), set[str]()
+        while True:
+            tests.append(self._and())
+            if not self._signals or self._at_frames is not None:
+                alone.append(tests[-1])
+            named, self._signals = named | self._signals, set()
+            if not self._take("or", ","):
+                break
+        self._signals = outer | named
+        if len(tests) == 1:
+            return tests[0]
+        self._at_frames, self._alone = None, _any_of(alone) if alone and named else None
+        return _any_of(tests)
+
+    def _and(self) -> filters.Test:
+        frames, states = list[filters.Test](), list[tuple[filters.Test, set[str]]]()
+        outer, each, first = self._signals, False, self._next.text
+        while True:
+            is_event, self._signals = self._next.text not in _NO_EVENT, set()
+            self._at_frames = self._alone = None
+            test = self._not()
+            if self._signals:
+                states.append((test, self._signals))
+            else:
+                frames.append(test)
+                each |= is_event
+            outer = outer | self._signals
+            if not self._take("and"):
+                break
+        self._signals = outer
+        if first == "(" and len(frames) + len(states) == 1:
+            return test
+        self._at_frames = self._alone = None
+        if not (frames and states):
+            return _all_of(frames or [test for test, _ in states])
+        self._at_frames = demands.AtFrames(frames, states, each=each)
+        return self._at_frames
+
     def _event(self) -> demands.RuleEvent:
         """Read a filter up to its end."""
         tokens, signals, nodes = list(self._tokens), self._signals, self._nodes
         self._signals, self._nodes = set(), set()
         test = self._or()
+        at_frames, alone = self._at_frames, self._alone
         taken = tokens[: len(tokens) - len(self._tokens)]
         paths, words = tuple(sorted(self._signals)), [token.text for token in taken]
         self._named |= self._signals
@@ -600,8 +657,11 @@ class _RuleParser(_QuantityParser):
         name = _OF.split(text)[0]
         is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
         if self._next.text != "dlc":  # of an error reset, too
-            test = errors_alone(test, taken, paths)
-        return demands.RuleEvent(text, test, paths, is_signal, has_node)
+            if at_frames is not None:
+                at_frames.select(errors_alone(demands.EVERY.matches, taken, paths))
+            test = at_frames or errors_alone(test, taken, paths)
+            alone = alone and errors_alone(alone, taken, paths)
+        return demands.RuleEvent(text, test, paths, is_signal, has_node, at_frames, alone)
 
     def _condition(self) -> demands.RuleEvent:
         return self._with_signals(self._event(), "while")
@@ -705,7 +765,8 @@ def _made(name: str, text: str) -> ExpressionRule:
     parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
-    missing = filters.MissingSignals(paths, parser.words)
+    unsure = [path for path in paths if not demands.is_event_signal(path)]
+    missing = filters.MissingSignals(unsure, parser.words)
     return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.canmon.model.check.expression.held import MAPPED, broken
+from tests.host.canmon.model.check.expression.held import MAPPED, broken, unjudged
 
 EMCY = "083#3081110000000000"
 
@@ -102,3 +102,67 @@ def test_a_condition_that_lasts_is_told_again_in_the_next_scope() -> None:
     rule = "3.statusword.fault never while node 3 operational"
     text = "1 703#05\n2 183#3F0200000000\n3 703#04\n4 703#05\n5 183#3F0200000000"
     assert [line[0] for line in broken(rule, MAPPED + text)] == ["2", "5"]
+
+
+CUT = "085#2032"
+TWO = "1 085#2032050000000000\n2 085#3081110000000000\n3 085#2032050000000000"
+
+
+@pytest.mark.parametrize(
+    ("rule", "found"),
+    [
+        ("emcy of 5 and code = 3220h never", "13"),
+        ("(emcy of 5 and code = 3220h) never", "13"),
+        ("code = 3220h and emcy of 5 never", "13"),
+        ("emcy and register = 5 never", "13"),
+        ("code = 3220h never", "13"),
+        ("5.code = 3220h never", "13"),
+        ("code in {8130h} ", "13"),
+        ("085 and code = 3220h always", "2"),
+        ("emcy of 4 and code = 3220h always", ""),
+        ("emcy or statusword.fault never", "1234"),
+        ("emcy and code = 3220h or sync never", "13"),
+        ("emcy of 5 and code = 3220h at most 1", "3"),
+        ("node = 5 and code = 3220h never", "13"),
+    ],
+)
+def test_a_comparison_at_a_frame_is_judged_at_each(rule: str, found: str) -> None:
+    text = f"0 705#05\n{TWO}\n4 {CUT}"
+    lines = broken(rule, text)
+    said = [line for line in lines if "no signal" not in line and not line.startswith("4 nothing")]
+    assert "".join(line[0] for line in said) == found
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "emcy of 5 and code = 3220h never",
+        "emcy and register = 5 never",
+        "code = 3220h never",
+        "emcy and code = 0 never after boot-up",
+        "nmt and command = stop never",
+        "emcy and register.2 never",
+        "code = 8130h always",
+        "code in {8130h}",
+        "emcy and node 5 stopped never",
+    ],
+)
+def test_a_rule_about_an_event_that_did_not_come_holds(rule: str) -> None:
+    text = "1 705#00\n2 705#05"
+    assert (broken(rule, text), unjudged(rule, text)) == ([], "")
+
+
+def test_a_state_at_a_frame_is_the_latest_on_its_bus() -> None:
+    text = f"1 705#7F\n2 {EMCY}\n3 705#05\n4 {EMCY}\n5 {RESET}\n6 {EMCY}\n7 705#04\n8 {EMCY}"
+    assert [one[0] for one in broken("emcy and node 5 operational never", text)] == ["4", "6"]
+    assert [one[0] for one in broken("emcy and node 5 operational always", text)] == ["2", "8"]
+    assert [one[0] for one in broken("emcy and not node 5 operational never", text)] == ["2", "8"]
+    assert [
+        one[0] for one in broken("sync and node 5 operational never", "1 705#05\n2 080#\n3 080#")
+    ] == [
+        "2",
+        "3",
+    ]
+    late = "emcy and node 5 operational never after node 5 stopped"
+    assert broken(late, f"1 705#04\n2 705#05\n3 {EMCY}")[0][0] == "3"
+    assert broken("emcy and node 6 operational never", text)[0].endswith("of node 6 came")
