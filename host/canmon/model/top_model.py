@@ -323,7 +323,7 @@ def _bus_line(bus: traffic.BusRow, bit_rate: int | None) -> str:
     load, errors = bus.load, bus.errors
     words = [
         f"{in_cells(bus.channel)}: {bus.frames} frames",
-        f"load {load_text(load.latest.bits, bit_rate)}",
+        f"load {load_text(load.latest.bit_s, bit_rate)}",
         f"error frames {errors.frames}",
     ]
     if errors.state is not None:
@@ -335,7 +335,7 @@ def _bus_line(bus: traffic.BusRow, bit_rate: int | None) -> str:
     words += [f"CAN FD {bus.fd}"] * bool(bus.fd)
     words += [_UNRATED] * bool(bus.unrated)
     words.append(f"mean {load_text(load.mean_bit_s, bit_rate)}")
-    words.append(f"peak {load_text(load.peak.bits, bit_rate)}")
+    words.append(f"peak {load_text(load.peak.bit_s, bit_rate)}")
     return ", ".join(words)
 
 

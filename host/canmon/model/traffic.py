@@ -467,6 +467,8 @@ def _state_after(error_class: int, flags: int) -> can.ErrorState | None:
 
 
 WINDOW_US: Final = 1_000_000
+LEAST_WINDOW_US: Final = 500_000
+"""Shortest last second that is judged by its own time. A shorter one may be a burst of frames."""
 
 
 class BusSecond(NamedTuple):
@@ -475,10 +477,17 @@ class BusSecond(NamedTuple):
     Attributes:
         at_us: start of the second in microseconds.
         bits: number of bits of the frames that ended in this second.
+        span_us: duration in microseconds, which is shorter if the traffic ends within the second.
     """
 
     at_us: int
     bits: int
+    span_us: int = WINDOW_US
+
+    @property
+    def bit_s(self) -> int:
+        """Load in bits per second."""
+        return self.bits * 1_000_000 // self.span_us
 
 
 class _LoadRow(NamedTuple):
@@ -488,7 +497,7 @@ class _LoadRow(NamedTuple):
         bits: bits of all frames.
         latest: latest complete second, or the first second while it lasts.
         peak: busiest second, or the first of several equally busy seconds.
-        mean_bit_s: mean bits per second, from the first window to the one with the latest frame.
+        mean_bit_s: mean bits per second, from the first frame to the latest one.
     """
 
     bits: int
@@ -503,11 +512,12 @@ class Load:
     A frame whose time is before that of a previous frame counts for the present second.
     """
 
-    __slots__ = ("_bits", "_ended", "_first_us", "_open", "_peak")
+    __slots__ = ("_begin_us", "_bits", "_ended", "_first_us", "_open_bits", "_peak")
 
     def __init__(self, first_us: int) -> None:
-        self._first_us, self._bits = first_us, 0
-        self._open = self._ended = self._peak = BusSecond(first_us, 0)
+        self._first_us = self._begin_us = first_us
+        self._bits = self._open_bits = 0
+        self._ended = self._peak = BusSecond(first_us, 0)
 
     def take(self, at_us: int, bits: int) -> BusSecond | None:
         """Count the bits of a frame.
@@ -516,34 +526,55 @@ class Load:
             The previous second if the frame is the first one after it, otherwise None.
         """
         self._bits += bits
-        begin_us, before = self._open
-        if at_us < begin_us + WINDOW_US:
-            self._open = BusSecond(begin_us, before + bits)
+        if at_us < self._begin_us + WINDOW_US:
+            self._open_bits += bits
             return None
-        ended = self._ended = self._open
+        ended = self._ended = BusSecond(self._begin_us, self._open_bits)
         self._peak = max(self._peak, ended, key=lambda second: second.bits)
-        self._open = BusSecond(_window_begin(self._first_us, at_us), bits)
+        self._begin_us, self._open_bits = _window_begin(self._first_us, at_us), bits
         return ended
 
-    def end(self) -> BusSecond:
-        """Return the open window."""
-        return self._open
+    def end(self, end_us: int) -> BusSecond:
+        """Return the open second, by its own time if it lasts at least `LEAST_WINDOW_US`.
 
-    def row(self, now_us: int) -> _LoadRow:
-        """Return the load of the bus until now."""
-        windows = (self._open.at_us - self._first_us) // WINDOW_US + 1
+        Args:
+            end_us: end of the traffic in microseconds.
+        """
+        span_us = min(end_us - self._begin_us, WINDOW_US)
+        return self._open(span_us if span_us >= LEAST_WINDOW_US else WINDOW_US)
+
+    @property
+    def begin_us(self) -> int:
+        """Start of the open second in microseconds."""
+        return self._begin_us
+
+    def row(self, now_us: int, last_us: int, *, ended: bool = False) -> _LoadRow:
+        """Return the load of the bus until now.
+
+        Args:
+            now_us: present time in microseconds.
+            last_us: time of the latest frame or error frame in microseconds.
+            ended: whether no more frames follow, so that the open second is over.
+        """
+        span_us = max(last_us, self._begin_us) - self._first_us
+        last = self.end(last_us) if ended else self._open(WINDOW_US)
+        if span_us < WINDOW_US:
+            last = self._open(span_us or WINDOW_US)
         return _LoadRow(
             self._bits,
             self._latest(now_us),
-            max(self._peak, self._open, key=lambda second: second.bits),
-            self._bits * 1_000_000 // (windows * WINDOW_US),
+            max(self._peak, last, key=lambda second: second.bit_s),
+            self._bits * 1_000_000 // (span_us or WINDOW_US),
         )
+
+    def _open(self, span_us: int) -> BusSecond:
+        return BusSecond(self._begin_us, self._open_bits, span_us)
 
     def _latest(self, now_us: int) -> BusSecond:
         begin_us = _window_begin(self._first_us, now_us) - WINDOW_US
         if begin_us < self._first_us:
-            return self._open
-        kept = (window for window in (self._open, self._ended) if window.at_us == begin_us)
+            return self._open(max(now_us - self._first_us, 0) or WINDOW_US)
+        kept = (one for one in (self._open(WINDOW_US), self._ended) if one.at_us == begin_us)
         return next(kept, BusSecond(begin_us, 0))
 
 
@@ -632,14 +663,14 @@ class _BusTally:
         for tally in self._ids.values():
             tally.memory.notch()
 
-    def row(self, now_us: int) -> BusRow:
+    def row(self, now_us: int, *, ended: bool) -> BusRow:
         """Return the statistics of the bus."""
         return BusRow(
             self._channel,
             self._frames,
             self._first_us,
             self._last_us,
-            self._load.row(now_us),
+            self._load.row(now_us, self._last_us, ended=ended),
             self._errors.row(),
             self._went_back,
             self._fd,
@@ -691,13 +722,19 @@ class Traffic:
         """Return the present statistics of all buses and CAN-IDs.
 
         Args:
-            now_us: present time in microseconds. By default, it is the time of the latest frame.
+            now_us: present time in microseconds. By default, the traffic has ended with the latest
+                frame.
         """
         at_us = self._last_us if now_us is None else now_us
         buses = [self._buses[name] for name in sorted(self._buses)]
         rows = tuple(row for bus in buses for row in bus.id_rows())
-        return TrafficSnapshot(at_us, self.buses(at_us), rows)
+        return TrafficSnapshot(at_us, self.buses(at_us, ended=now_us is None), rows)
 
-    def buses(self, now_us: int) -> tuple[BusRow, ...]:
-        """Return only the rows of the buses, which takes less time."""
-        return tuple(self._buses[name].row(now_us) for name in sorted(self._buses))
+    def buses(self, now_us: int, *, ended: bool = False) -> tuple[BusRow, ...]:
+        """Return only the rows of the buses, which takes less time.
+
+        Args:
+            now_us: present time in microseconds.
+            ended: whether no more frames follow, so that the last second is over.
+        """
+        return tuple(self._buses[name].row(now_us, ended=ended) for name in sorted(self._buses))

@@ -215,7 +215,7 @@ class StatusLine(Widget):
         self._counts = [*self._counts[-10:], model.frames]
         line = [ARMED if session.armed else _LISTENING, *self._recorder.light()]
         for bus in model.top.traffic.buses(model.now_us):
-            load = load_text(bus.load.latest.bits, model.top.view.bit_rate)
+            load = load_text(bus.load.latest.bit_s, model.top.view.bit_rate)
             line.append((f" {bus.channel} {load}", ""))
             if bus.errors.state is not None:
                 state = bus.errors.state.name.lower().replace("_", "-")

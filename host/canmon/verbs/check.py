@@ -71,6 +71,7 @@ class _FindingPrinter:
         stamp: format of times in text, or None for seconds since the epoch.
         kept: whether to keep the findings for a report.
         rules: names of all rules.
+        most: number of findings to show, or None to show all.
 
     Attributes:
         counts: number of findings by rule.
@@ -82,9 +83,15 @@ class _FindingPrinter:
     unjudged = Unjudged({})
 
     def __init__(
-        self, jsonl: bool, stamp: Stamp | None = None, *, kept: bool, rules: Sequence[str] = ()
+        self,
+        jsonl: bool,
+        stamp: Stamp | None = None,
+        *,
+        kept: bool,
+        rules: Sequence[str] = (),
+        most: int | None = None,
     ) -> None:
-        self._rules = rules
+        self._rules, self._most = rules, most
         self.counts: Counter[str] = Counter()
         self.findings: list[TrafficFinding] = []
         self.frames = self._shown = 0
@@ -112,10 +119,11 @@ class _FindingPrinter:
 
     def take(self, findings: Sequence[TrafficFinding]) -> None:
         """Show findings."""
+        room = None if self._most is None else max(0, self._most - self.counts.total())
         self.counts.update(finding.rule for finding in findings)
         self.findings += findings if self._kept else ()
-        new = findings[self._shown :]
-        self._shown -= len(findings) - len(new)
+        new = findings[self._shown : room]
+        self._shown -= min(self._shown, len(findings))
         if new:
             with until_unread():
                 click.echo("\n".join(map(self._text, new)))
@@ -136,9 +144,10 @@ class _FindingPrinter:
         return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
 
     def doubts(self) -> list[str]:
-        """Report what was judged and what was not judged, with one line each."""
+        """Report what was not shown, judged and not judged, with one line each."""
         held = [name for name in self._rules if name not in self.none_judged]
-        none = [f"judged: {', '.join(held)}"] * bool(held)
+        none = _more_findings(self._most or self.counts.total(), self.counts.total())
+        none += [f"judged: {', '.join(held)}"] * bool(held)
         none += [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
         return none + [f"not judged: {text}" for text in self.unjudged.notes]
 
@@ -151,6 +160,12 @@ class _FindingPrinter:
         if not none:
             return "all rules hold"
         return f"{counted(len(self._rules) - none, 'rule')} held, {none} judged nothing"
+
+
+def _more_findings(shown: int, count: int) -> list[str]:
+    """Return a line about the findings that are not shown, if there are any."""
+    left = max(0, count - shown)
+    return [f"and {counted(left, 'finding')} more: --max {count}"] * bool(left)
 
 
 def finding_json(finding: TrafficFinding) -> str:
@@ -303,7 +318,7 @@ _MOST_AROUND: Final = 1_000
         "--max",
         "most",
         type=click.IntRange(1),
-        help="Findings without a RULE, and frames of each, that are shown (default: 20 and 3).",
+        help="Findings that are shown (default: all; without a RULE 20, and 3 frames of each).",
     ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
@@ -387,7 +402,7 @@ def command(  # noqa: PLR0913 - options
     heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
     shown = Stamp(stamp) if stamp else None
-    verdict = _FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
+    verdict = _FindingPrinter(jsonl, shown, kept=kept, rules=rules.names(), most=most)
     log = None if decoder else block_log(words, cut)
     if log is not None:
         checker = column_check.ColumnChecker(rules, bit_rate, heartbeats)
@@ -491,10 +506,7 @@ class _Usual:
         if shown:
             with until_unread():
                 click.echo("\n".join(map(text_of, shown)))
-        left = len(found.faults) - len(shown)
-        self._said = [f"and {counted(left, 'finding')} more: --max {len(found.faults)}"] * bool(
-            left
-        )
+        self._said = _more_findings(len(shown), len(found.faults))
 
     def learn(self, output: Path | None) -> None:
         """Write the usual traffic as rules."""
@@ -596,8 +608,6 @@ def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
         refuse_idle("it is for the rules of --init", "output")
     if jsonl:
         refuse_idle("--jsonl has its own times, and all findings", "stamp", "most")
-    if not _is_empty(rules):
-        refuse_idle("with rules all findings are shown", "most")
     if not rules.expressions:
         refuse_idle("it is for a --rule", "around", "dbc")
 

@@ -20,7 +20,14 @@ from tickrig.host.canmon.model.frames import (
     node_of,
     rate_text,
 )
-from tickrig.host.canmon.model.traffic import BitRates, BusRow, IdRow, Traffic, TrafficSnapshot
+from tickrig.host.canmon.model.traffic import (
+    WINDOW_US,
+    BitRates,
+    BusRow,
+    IdRow,
+    Traffic,
+    TrafficSnapshot,
+)
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.sources.source import BlockLog, LogCut, Source, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import cut_options, source_command
@@ -81,11 +88,12 @@ def node_rows(rows: Iterable[IdRow]) -> list[_NodeRow]:
 
 def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
     """Return the statistics of a bus, one per line."""
-    load, span_s = bus.load, (bus.last_us - bus.first_us) / 1e6
+    load, span_s, peak = bus.load, (bus.last_us - bus.first_us) / 1e6, bus.load.peak
+    window = "the second" if peak.span_us == WINDOW_US else f"{peak.span_us / 1e6:.6f} s"
     lines = [
         f"{bus.channel}: {bus.frames} frames in {span_s:.6f} s, {load.bits} bits with stuff bits",
         f"  load: mean {load_text(load.mean_bit_s, bit_rate)}, peak"
-        f" {load_text(load.peak.bits, bit_rate)} in the second from {load.peak.at_us / 1e6:.6f}",
+        f" {load_text(peak.bit_s, bit_rate)} in {window} from {peak.at_us / 1e6:.6f}",
         f"  error frames: {bus.errors.frames}",
     ]
     if bus.fd:
@@ -146,10 +154,10 @@ def bus_json(bus: BusRow, bit_rate: int | None) -> str:
         last=bus.last_us / 1e6,
         bits=load.bits,
         mean_bit_s=load.mean_bit_s,
-        peak_bit_s=load.peak.bits,
+        peak_bit_s=load.peak.bit_s,
         peak_t=load.peak.at_us / 1e6,
         mean_load=None if bit_rate is None else load.mean_bit_s / bit_rate,
-        peak_load=None if bit_rate is None else load.peak.bits / bit_rate,
+        peak_load=None if bit_rate is None else load.peak.bit_s / bit_rate,
         errors=errors.frames,
         error_kinds=dict(errors.kinds),
         state=None if errors.state is None else errors.state.name.lower(),

@@ -28,7 +28,7 @@ from tickrig.host.canmon.model.check.rule import (
 from tickrig.host.canmon.model.check.rules import NO_EDS, NO_LOSS, EdsHeartbeats, Rules
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.frames import ERROR, AnyFrame, Record, any_ident, s_text
-from tickrig.host.canmon.model.traffic import BitRates, BusSecond, Load
+from tickrig.host.canmon.model.traffic import LEAST_WINDOW_US, BitRates, BusSecond, Load
 from tickrig.wire.can import ErrorFrame, FdFrame, frame_bits
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class RuleCheck:
         """Return the violations at the end: open seconds, missing frames, reports of the source."""
         found = []
         for channel, load in sorted(loads.items()):
-            found += self.judge_window(channel, load.end())
+            found += self.judge_window(channel, load.end(end_us))
         latest_us: dict[int, int] = {}
         for (_, ident), seen in self._evidence().items():
             latest_us[ident] = max(seen.last_us, latest_us.get(ident, seen.last_us))
@@ -161,6 +161,8 @@ class RuleCheck:
             for text in rule.notes(evidence)
         ]
         notes += [f"{name}: {text}" for name, text in why if text and name not in none]
+        if self._rules.max_load is not None and MaxLoad.name not in none and evidence.is_short:
+            notes.append(f"{MaxLoad.name}: the traffic lasts less than {LEAST_WINDOW_US / 1e6:g} s")
         return Unjudged(none, tuple(notes))
 
 

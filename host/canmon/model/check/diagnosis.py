@@ -813,6 +813,7 @@ class _BusJudge:
     def _peak(self) -> tuple[int, tuple[int, int]]:
         """Return bits per second of the busiest half second, and the rows of a half second.
 
+        A shorter recording is taken by its own time.
         The rows are the ends of the first half second above the limit, or else of the busiest one.
         """
         first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
@@ -820,12 +821,13 @@ class _BusJudge:
         sums = {at: sum(steps.get(at + off, 0) for off in range(width)) for at in steps}
         busiest = max(sums, key=lambda at: (sums[at], -at), default=0)
         most = self._rules.bits_per_second if self._rules else None
-        limit = (most or 0) * _LOAD_US / 1_000_000
+        span_us = min(_LOAD_US, max(_LOAD_STEP_US, self._end_us - first_us))
+        limit = (most or 0) * span_us / 1_000_000
         shown = min((at for at in sums if most and sums[at] > limit), default=busiest)
         begin_us = first_us + shown * _LOAD_STEP_US
         begin, end = (bisect_left(self._times, at) for at in (begin_us, begin_us + _LOAD_US))
         begin = min(begin, len(self._times) - 1)
-        return sums.get(busiest, 0) * 1_000_000 // _LOAD_US, (begin, max(begin, end - 1))
+        return sums.get(busiest, 0) * 1_000_000 // span_us, (begin, max(begin, end - 1))
 
     def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
         """Combine the hits of one rule about one node or CAN-ID."""

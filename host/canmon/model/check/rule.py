@@ -18,7 +18,7 @@ from tickrig.host.canmon.model.frames import (
     ms_text,
     sender_of,
 )
-from tickrig.host.canmon.model.traffic import WINDOW_US, BusSecond
+from tickrig.host.canmon.model.traffic import LEAST_WINDOW_US, BusSecond
 from tickrig.host.text.values import counted
 from tickrig.wire.can import STANDARD_MAX, CanFrame, ErrorFrame, describe_error_frame
 from tickrig.wire.canopen import nmt, sdo_frame
@@ -147,6 +147,12 @@ class CheckedTraffic(NamedTuple):
         times = {us for one in self.seen.values() for us in (one.first_us, one.last_us)}
         return len(times) == 1 and sum(one.frames for one in self.seen.values()) > 1
 
+    @property
+    def is_short(self) -> bool:
+        """Whether the traffic is too short for its load to be judged by its own time."""
+        first_us = min((one.first_us for one in self.seen.values()), default=self.end_us)
+        return self.end_us - first_us < LEAST_WINDOW_US
+
     def on(self, ident: int) -> list[Seen]:
         """Return the frames of an identifier on each bus."""
         return [one for (_, other), one in self.seen.items() if other == ident]
@@ -252,7 +258,7 @@ class MaxLoad:
 
     def judge(self, channel: str, window: BusSecond) -> str | None:
         """Report a second whose load is too high."""
-        percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
+        percent = window.bits * 100_000_000 / (self._bit_rate * window.span_us)
         if percent <= self._percent:
             return None
         return f"{channel}: load {percent:.1f} %, at most {self._percent:g} % is right"

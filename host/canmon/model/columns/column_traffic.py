@@ -406,7 +406,7 @@ class _ColumnBus:
             self._frames,
             self._first_us,
             self._last_us,
-            self._load.load.row(now_us),
+            self._load.load.row(now_us, self._last_us, ended=True),
             self._errors.row(),
             self._went_back,
         )

@@ -313,7 +313,7 @@ class ColumnLoad:
         """Count frames. Return the completed seconds, each with the row that ended it."""
         if not len(at_us):
             return []
-        opened = (self.load.end().at_us - self._first_us) // WINDOW_US
+        opened = (self.load.begin_us - self._first_us) // WINDOW_US
         latest_us = np.maximum.accumulate(at_us - self._first_us)
         seconds = np.maximum(latest_us // WINDOW_US, opened)
         begins = np.flatnonzero(np.diff(seconds, prepend=-1))

@@ -200,7 +200,7 @@ def test_the_status_tells_load_controller_errors_and_rate(tmp_path: Path) -> Non
         monitor.refresh_view()
         session.step()
         text = status(monitor)
-        assert "can0 0.0 % passive 1 error frames  2 frames  2/s  lost 0  end of the log" in text
+        assert "can0 0.1 % passive 1 error frames  2 frames  2/s  lost 0  end of the log" in text
 
     on_monitor(session, act)
 

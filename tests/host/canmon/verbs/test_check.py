@@ -107,6 +107,20 @@ def test_only_so_many_findings_and_frames_are_shown(tmp_path: Path) -> None:
     assert "and 1 finding more: --max 2" in result.stderr
 
 
+@pytest.mark.parametrize("rule", [["--rule", "emcy never", "--around", "0"], ["--no-emcy"]])
+def test_only_so_many_findings_of_a_rule_are_shown(tmp_path: Path, rule: list[str]) -> None:
+    text = "".join(f"({at}.000000) can0 083#3081110000000000\n" for at in range(5))
+    log, report = write(tmp_path / "run.log", text), tmp_path / "a.xml"
+    everything = check(log, *rule)
+    result = check(log, *rule, "--max", "2", "--junit", str(report))
+    assert result.exit_code == everything.exit_code == 1
+    assert result.stdout.splitlines() == everything.stdout.splitlines()[:2]
+    assert result.stderr.splitlines()[0] == "and 3 findings more: --max 5"
+    assert result.stderr.splitlines()[1:] == everything.stderr.splitlines()
+    assert report.read_text("utf-8").count("083#3081110000000000") >= 5
+    assert "more" not in check(log, *rule, "--max", "5").stderr
+
+
 def test_where_no_frame_came_nothing_is_judged_without_a_rule(tmp_path: Path) -> None:
     result = check(write(tmp_path / "run.log", ""))
     assert (result.exit_code, result.stdout) == (5, "")

@@ -108,8 +108,8 @@ FORMS: dict[str, set[str]] = {
     "graph run.log 185[2] -o g.csv": OPENS | DECODES | PICTURES | {"window_us"},
     "check run.log": OPENS | {"around", "output", "dbc"},
     "check run.log --jsonl": OPENS | {"init"} | {"around", "output", "dbc", "stamp", "most"},
-    "check run.log --rule 'emcy never'": OPENS | {"init", "output", "most"},
-    "check run.log --no-emcy": OPENS | {"init", "around"} | {"init"} | {"output", "dbc", "most"},
+    "check run.log --rule 'emcy never'": OPENS | {"init", "output"},
+    "check run.log --no-emcy": OPENS | {"init", "around"} | {"init"} | {"output", "dbc"},
     "check run.log --init": OPENS
     | {"around", "most", "report_path", "sarif_path", "jsonl", "stamp", "dbc"},
     "report run.log -o g.html": OPENS | {"span_us"},

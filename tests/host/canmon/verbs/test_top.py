@@ -18,7 +18,7 @@ def top(*words: str, text: str | None = None) -> Result:
 def test_a_log_file_ends_with_the_table(log: str) -> None:
     result = top(log)
     assert result.exit_code == 0, result.output
-    assert result.stdout.splitlines()[0].startswith("can0: 3 frames, load 0.2 kbit/s,")
+    assert result.stdout.splitlines()[0].startswith("can0: 3 frames, load 1.2 kbit/s,")
     assert result.stdout.splitlines()[3].split() == [
         *("181", "2", "10.00", "100.000", "100.000", "100.000"),
         *("100.000", "100.000", "0.000", "0", "0.1", "01"),
@@ -50,7 +50,7 @@ def test_frames_that_are_not_wanted_are_not_counted(log: str) -> None:
 
 
 def test_the_load_is_a_share_of_the_bit_rate(log: str) -> None:
-    assert "mean 1.7 %" in top(log, "-b", "10000").stdout
+    assert "mean 11.6 %" in top(log, "-b", "10000").stdout
 
 
 def test_the_help_shows_examples_and_sources() -> None:

@@ -277,6 +277,14 @@ def test_another_identity_and_order_of_boot_ups_is_found() -> None:
     assert [place.number for place in faults["learnt-identity"].frames] == [5]
 
 
+def test_the_load_of_a_short_log_is_learnt_by_its_own_time() -> None:
+    for step_us, bits_s in ((10_000, 5_600), (1_000, 56_000)):  # 100 frames in 1 s, and in 0.1 s
+        one = Diagnoser()
+        one.take(lines(" ".join(["181#"] * 100), step_us))
+        (bus,) = one.summaries()
+        assert bits_s * 0.8 < bus.bits_per_second < bits_s * 1.1
+
+
 def test_what_a_good_log_has_is_usual() -> None:
     usual = put(list(sound()), 2_030_000, "091#1023020000000000")
     one = Diagnoser()

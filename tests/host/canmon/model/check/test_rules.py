@@ -416,6 +416,25 @@ def test_a_second_that_is_not_over_is_judged_at_the_end() -> None:
     assert len(broken(Rules(max_load=0), "1 181#", bit_rate=10_000)) == 1
 
 
+def test_the_last_half_second_is_judged_by_its_own_time() -> None:
+    busy = "0 181#\n" + "\n".join(f"{1 + n / 100:.2f} 181#" for n in range(51))
+    assert broken(Rules(max_load=50), busy, bit_rate=10_000) == [
+        "1 can0: load 51.0 %, at most 50 % is right"
+    ]
+    assert broken(Rules(max_load=50), busy.rpartition("\n")[0], bit_rate=10_000) == []
+
+
+@pytest.mark.parametrize(("last_s", "notes"), [(0.5, ()), (0.4, ("less than 0.5 s",))])
+def test_a_load_of_a_short_log_is_noted(last_s: float, notes: tuple[str, ...]) -> None:
+    checker = Checker(Rules(max_load=50), 10_000)
+    for record in hear(f"0 181#\n{last_s} 181#"):
+        checker.take(record)
+    end_us = round(last_s * 1e6)
+    assert checker.end(end_us) == []
+    said = checker.unjudged(end_us).notes
+    assert said == tuple(f"max-load: the traffic lasts {one}" for one in notes)
+
+
 def test_a_load_without_a_bit_rate_is_refused() -> None:
     with pytest.raises(ValueError, match="a limit of the load needs the bit rate: give -b"):
         Checker(Rules(max_load=50))

@@ -42,7 +42,7 @@ def test_the_table_of_nodes() -> None:
 def test_what_a_bus_did() -> None:
     assert bus_lines(snapshot(LOG).buses[0], 10_000) == [
         "can0: 51 frames in 0.650000 s, 2924 bits with stuff bits",
-        "  load: mean 29.2 %, peak 29.2 % in the second from 0.000000",
+        "  load: mean 45.0 %, peak 45.0 % in 0.650000 s from 0.000000",
         "  error frames: 1",
         "    1 x bus-off, restarted",
         "  controller: bus-off",
@@ -58,7 +58,7 @@ def test_a_bus_of_error_frames_alone_has_no_shares() -> None:
 def test_a_bus_as_json() -> None:
     said = json.loads(bus_json(snapshot(LOG).buses[0], 10_000))
     assert (said["v"], said["what"], said["ch"], said["n"]) == (1, "bus", "can0", 51)
-    assert (said["mean_load"], said["errors"], said["went_back"]) == (0.2924, 1, 1)
+    assert (said["mean_load"], said["errors"], said["went_back"]) == (0.4498, 1, 1)
     assert json.loads(bus_json(snapshot(LOG).buses[0], None))["peak_load"] is None
 
 

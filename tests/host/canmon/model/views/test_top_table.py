@@ -17,7 +17,7 @@ LOG = hear(
 )
 
 TABLE = """\
-can0: 22 frames, load 0.8 kbit/s, error frames 1, controller passive, TEC 96 REC 128, mean 0.6 kbit/s, peak 0.8 kbit/s
+can0: 22 frames, load 0.8 kbit/s, error frames 1, controller passive, TEC 96 REC 128, mean 0.8 kbit/s, peak 0.8 kbit/s
 lost 3, 3 identifiers by id
 CAN-ID      frames     1/s   gap ms      min      avg      p99      max   jitter missed   age s data
 181             20   10.00  100.000  100.000  100.000  100.000  100.000    0.000      0     0.2 13 00 02

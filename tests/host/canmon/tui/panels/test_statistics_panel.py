@@ -25,7 +25,7 @@ def test_it_is_the_table_of_top_and_its_keys() -> None:
         await pilot.press("3")
         await pilot.pause()  # now it has a size
         lines = shown(monitor)
-        assert lines[0].startswith("can0: 134 frames, load 14.8 kbit/s")
+        assert lines[0].startswith("can0: 134 frames, load 20.1 kbit/s")
         assert lines[1] == "lost 0, 14 identifiers by id"
         assert lines[3].split()[:2] == ["000", "4"]
         await pilot.press("b")
