@@ -471,6 +471,15 @@ LEAST_WINDOW_US: Final = 500_000
 """Shortest last second that is judged by its own time. A shorter one may be a burst of frames."""
 
 
+def bits_per_second(bits: int, span_us: int) -> int:
+    """Return the mean load over a time. Bits of frames that all have one time count for a second.
+
+    >>> bits_per_second(6_861, 490_000), bits_per_second(111, 0)
+    (14002, 111)
+    """
+    return bits * 1_000_000 // (span_us or WINDOW_US)
+
+
 class BusSecond(NamedTuple):
     """Amount of traffic on one bus within one second.
 
@@ -487,7 +496,7 @@ class BusSecond(NamedTuple):
     @property
     def bit_s(self) -> int:
         """Load in bits per second."""
-        return self.bits * 1_000_000 // self.span_us
+        return bits_per_second(self.bits, self.span_us)
 
 
 class _LoadRow(NamedTuple):
@@ -564,7 +573,7 @@ class Load:
             self._bits,
             self._latest(now_us),
             max(self._peak, last, key=lambda second: second.bit_s),
-            self._bits * 1_000_000 // (span_us or WINDOW_US),
+            bits_per_second(self._bits, span_us),
         )
 
     def _open(self, span_us: int) -> BusSecond:

@@ -34,6 +34,7 @@ from tickrig.host.canmon.model.frames import (
     rate_text,
 )
 from tickrig.host.canmon.model.survey import Mark, Survey, Thinned
+from tickrig.host.canmon.model.traffic import bits_per_second
 from tickrig.host.text.page_text import content_policy, duration, harmless, json_text, one_line
 from tickrig.host.text.values import counted
 from tickrig.wire.canopen import nmt
@@ -140,7 +141,7 @@ def _what(survey: Survey, head: ReportHead) -> str:
     buses = ", ".join(sorted(survey.frames))
     begun = f", from {_date(survey.first_us)}" if survey.first_us >= DATED_US else ""
     bits = sum(sum(spans.values()) for spans in survey.bits.sums.values())
-    load = load_text(bits * 1_000_000 // span_us, head.bit_rate) if span_us else ""
+    load = load_text(bits_per_second(bits, span_us), head.bit_rate) if span_us else ""
     busy = f", at a mean load of {load} over that time" if load and len(survey.frames) == 1 else ""
     return f"{head.source} holds {frames:,} frames of {buses} in {duration(span_us)}{begun}{busy}."
 

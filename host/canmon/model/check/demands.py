@@ -26,7 +26,7 @@ def _sender_of(record: Record) -> _Sender:
     return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
 
 
-EVENT_SIGNALS: Final = frozenset(["code", "register", "command", "class", "days", "ms"])
+_EVENT_SIGNALS: Final = frozenset(["code", "register", "command", "class", "days", "ms"])
 """Signals of EMCY, NMT, LSS, TIME and error frames.
 
 Their names are known even if none of these frames came.
@@ -39,7 +39,7 @@ class AtFrames:
     """Test of signals at certain frames, as `tpdo1 and 3.statusword.fault` has it.
 
     If a frame does not contain a signal, its latest value on the bus counts. The values of
-    `EVENT_SIGNALS` count only in their own frames. The test must see all frames.
+    `_EVENT_SIGNALS` count only in their own frames. The test must see all frames.
 
     Args:
         frames: tests that select the frames.
@@ -52,11 +52,12 @@ class AtFrames:
         self, frames: Iterable[Test], states: Iterable[tuple[Test, Collection[str]]], *, each: bool
     ) -> None:
         self._frames, self.each = tuple(frames), each
-        self._states = tuple((test, _SignalState(paths, kept=each)) for test, paths in states)
+        self._states = [_SignalState(test, paths, kept=each) for test, paths in states]
+        self._kept = [state for state in self._states if state.kept]
 
-    def select(self, test: Test) -> None:
-        """Restrict the selected frames to those that pass a test."""
-        self._frames = (*self._frames, test)
+    def select(self, *tests: Test) -> None:
+        """Restrict the selected frames to those that pass more tests."""
+        self._frames += tests
 
     def __call__(self, record: AnyRecord, decoded: Decoded) -> bool:
         """Return whether a frame is selected and the tests of signals hold at it."""
@@ -67,52 +68,60 @@ class AtFrames:
 
         The result is None if the frame is not selected, or if a value is unknown.
         """
+        for state in self._kept:
+            state.take(record, decoded)
+        for test in self._frames:
+            if not test(record, decoded):
+                return None
         if not isinstance(record, Record):
             return None
-        states = [state.at(test, record, decoded) for test, state in self._states]
-        if not all(test(record, decoded) for test in self._frames) or None in states:
-            return None
-        return all(states)
+        states = [state.at(record, decoded) for state in self._states]
+        return None if None in states else all(states)
 
 
 class _SignalState:
     """The latest result of a test of signals on each bus, and of each node on it.
 
     Args:
+        test: test of signals.
         paths: names of the signals.
         kept: whether a result counts until the next one, or only for its own frame.
     """
 
-    def __init__(self, paths: Collection[str], *, kept: bool) -> None:
+    def __init__(self, test: Test, paths: Collection[str], *, kept: bool) -> None:
         places = [signal_place(path) for path in paths]
-        self._finders = [signal_reader(path) for path in paths]
-        self._kept = kept and not any(map(is_event_signal, paths))
+        self._test, self._finders = test, [signal_reader(path) for path in paths]
+        self.kept = kept and not any(map(is_event_signal, paths))
         self._own = any(node is None and " " not in name for node, name, _ in places)
         self._latest: dict[tuple[str, int | None], tuple[bool, _Sender]] = {}
 
-    def at(self, test: Test, record: Record, decoded: Decoded) -> bool | None:
+    def take(self, record: AnyRecord, decoded: Decoded) -> None:
+        """Keep the result of the test at a frame that contains a signal."""
+        for find in self._finders:
+            if find(decoded) is not None and isinstance(record, Record):
+                latest = self._test(record, decoded), _sender_of(record)
+                channel = record.channel
+                self._latest[channel, None] = self._latest[channel, decoded.node] = latest
+                return
+
+    def at(self, record: Record, decoded: Decoded) -> bool | None:
         """Return the result of the test at a frame, or None if it is unknown."""
-        channel, node = record.channel, decoded.node
         if any(find(decoded) is not None for find in self._finders):
-            found = test(record, decoded)
-            if self._kept:
-                kept = found, _sender_of(record)
-                self._latest[channel, None] = self._latest[channel, node] = kept
-            return found
-        latest = self._latest.get((channel, node if self._own else None))
+            return self._test(record, decoded)
+        latest = self._latest.get((record.channel, decoded.node if self._own else None))
         if latest is None or latest[1] == _sender_of(record):  # a frame that is cut short
             return None
         return latest[0]
 
 
 def is_event_signal(path: str) -> bool:
-    """Return whether a signal is one of `EVENT_SIGNALS`, or a bit of it.
+    """Return whether a signal is one of `_EVENT_SIGNALS`, or a bit of it.
 
     >>> is_event_signal("5.code"), is_event_signal("register.2"), is_event_signal("speed")
     (True, True, False)
     """
     name, _, bit = signal_place(path)[1].partition(".")
-    return name in EVENT_SIGNALS and (not bit or bit.isdecimal())
+    return name in _EVENT_SIGNALS and (not bit or bit.isdecimal())
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +284,8 @@ class Truth(RuleDemand):
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the condition with its required value."""
-        self.judged |= self._proves
+        if self._proves:
+            self.judged = True
         if self._alone is not None and self._alone(record, decoded):
             self.judged = True
             return _said(decoded)

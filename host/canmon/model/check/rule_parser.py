@@ -658,7 +658,9 @@ class _RuleParser(_QuantityParser):
         is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
         if self._next.text != "dlc":  # of an error reset, too
             if at_frames is not None:
-                at_frames.select(errors_alone(demands.EVERY.matches, taken, paths))
+                every = demands.EVERY.matches
+                errors = errors_alone(every, taken, paths)
+                at_frames.select(*[errors] * (errors is not every))
             test = at_frames or errors_alone(test, taken, paths)
             alone = alone and errors_alone(alone, taken, paths)
         return demands.RuleEvent(text, test, paths, is_signal, has_node, at_frames, alone)
