@@ -79,7 +79,7 @@ _IDENTITY: Final = 0x1018
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
     """Read the identity object (1018h) of a node with SDO.
 
-    The result is None if the node does not send its vendor or its product.
+    The result is None if the node does not return its vendor-ID or its product code.
     """
     numbers = [read_number(bus, node_id, _IDENTITY, sub) for sub in (1, 2, 3)]
     return eds_folder.node_identity(numbers)
@@ -178,7 +178,7 @@ def read_eds_paths(
     folders: Sequence[Path] = (),
     notify: Callable[[str], None] = say,
 ) -> eds_folder.EdsFiles:
-    """Read EDS files, of which each describes the node with one node-ID.
+    """Read EDS files by node-ID. Each file describes the node with this node-ID.
 
     Mistakes in a file are reported on standard error, and the entries with mistakes are not used.
 

@@ -65,7 +65,7 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
 def load_rule(name: str) -> Callable[[], Rule]:
     """Return the function that makes a rule of `canmon check`.
 
-    An installed package provides the rule.
+    The rule is one that an installed package adds.
 
     Raises:
         ExtensionError: no package has a rule of this name, or the rule cannot be used.

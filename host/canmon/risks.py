@@ -39,7 +39,7 @@ NMT_WORDS: Final = {
 
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
-    """Return a warning about motion that a write to objects of a node may cause, empty for none.
+    """Return a warning about motion that a write to objects of a node may cause, or an empty text.
 
     The text depends on the objects, and on whether the node is a CiA 402 drive.
     """

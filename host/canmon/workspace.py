@@ -125,7 +125,8 @@ class Workspace:
     def put(self, name: str, settings: Mapping[str, Any]) -> None:
         """Change settings of one section, without writing the file.
 
-        The value None removes a key. Keys that `settings` does not contain stay.
+        If a value is None, its key is removed. Keys that `settings` does not contain are not
+        changed.
         """
         if settings:
             _merge(self._document, {name: settings})
@@ -375,7 +376,7 @@ class _Kept(Protocol):
 class PanelSettings:
     """Storage that connects the panels of the monitor with a workspace file.
 
-    It loads the settings of the panels from the file, and saves them to the file.
+    The storage loads the settings of the panels from the file, and saves them to the file.
 
     Args:
         workspace: workspace file with the settings.
@@ -410,9 +411,9 @@ class PanelSettings:
     def save(self) -> str:
         """Write changed settings of the panels to the workspace file.
 
-        Return the text of an error, or an empty text. The same error is returned only once. If
-        another program has changed the file, the settings are not written until the user exports
-        them.
+        If the file cannot be written, return the text of the error, otherwise an empty text. The
+        same error is returned only once. If another program has changed the file, the settings are
+        not written until the user exports them.
         """
         self._put()
         try:
@@ -505,8 +506,8 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 def below(*path: str | int) -> Iterator[None]:
     """Context manager that puts the keys of an outer table in front of the path of a SettingError.
 
-    A function that reads a nested table uses it, so that the error names the full path. Any other
-    ValueError in the block becomes a SettingError of this path.
+    A function that reads a nested table uses this context manager, so that the error names the full
+    path. Any other ValueError in the block becomes a SettingError with the path of the outer table.
     """
     try:
         yield
@@ -520,7 +521,7 @@ def below(*path: str | int) -> Iterator[None]:
 def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
     """Return the bus name in the settings of a sending panel, or an empty text for the first bus.
 
-    A log has no buses, so any name is then valid.
+    If the source is a log, no bus is open, and any name is valid.
 
     Raises:
         SettingError: no open bus has this name.

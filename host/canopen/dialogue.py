@@ -82,8 +82,7 @@ class SdoRequest:
     SdoTimeout is raised if no response arrives.
 
     Attributes:
-        goes_on: whether the request continues a transfer that the server has open. Otherwise the
-            request starts a transfer.
+        goes_on: whether the request continues a transfer. Otherwise, the request starts a transfer.
     """
 
     request: bytes
@@ -186,10 +185,10 @@ class QueuedScript(NamedTuple):
 
 
 class Unanswered(list[Object]):
-    """Objects of SDO requests that the server may still answer, in the order of the requests.
+    """Objects named in SDO requests that the server may still answer, in the order of the requests.
 
-    A late answer to such a request must not be taken for the answer to a later one. A repeated
-    request counts once.
+    With this list, a late answer to an earlier request is not taken for the answer to a later
+    request. A repeated request counts once.
     """
 
     def add(self, at: Object) -> None:
@@ -198,9 +197,9 @@ class Unanswered(list[Object]):
             self.append(at)
 
     def hear(self, at: Object) -> None:
-        """Forget the requests that were sent before one that the server has answered now.
+        """Forget the requests that were sent before the request that the server has just answered.
 
-        The server no longer answers the earlier ones.
+        The server will not answer the earlier requests any more.
         """
         if at in self:
             del self[: self.index(at)]
@@ -208,9 +207,9 @@ class Unanswered(list[Object]):
     def fence(self, at: Object) -> Object:
         """Return an object to read, whose answer comes after all late answers about object `at`.
 
-        The latest such object is preferred, so that a node that is gone gets repeated requests for
-        the same object. If all such objects have unanswered requests, the oldest request is
-        dropped. A server that answers at this point has left more than 250 requests unanswered.
+        If the object of the latest request is suitable, it is returned again, so that a node that
+        is gone gets repeated requests for the same object. If all suitable objects have unanswered
+        requests, the oldest request is dropped.
         """
         last = self[-1]
         if last in FENCES and last != at:

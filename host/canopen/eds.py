@@ -82,7 +82,7 @@ def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
     """Read the valid parts of an EDS, for a host that displays or manages the device.
 
     Returns:
-        The device without its unusable objects, and all findings in the file.
+        The device without its unusable objects, and the list of all findings in the file.
 
     Raises:
         OSError: the file cannot be read.
@@ -95,7 +95,7 @@ def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
 
 
 def eds_number(text: str) -> int | None:
-    """Return the number of a keyword, written in any way that an EDS has, or None if it is none."""
+    """Return the number that a value in an EDS represents, or None if it is not a number."""
     try:
         return parse_number(plain_numbers(text))
     except ValueError:

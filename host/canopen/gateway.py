@@ -410,13 +410,13 @@ vs: visible string, in double quotes; os, us, d: base64; hex: bytes as 01 AB"""
 class Gateway:
     """CANopen gateway for one client, which executes its command lines (CiA 309-3, ASCII mapping).
 
-    Each client has its own settings. The gateway does not support PDO and emergency commands,
-    device commands such as `set heartbeat`, unsolicited events, and SDO block transfer.
+    Each client has its own settings. The gateway supports none of these: PDO and emergency
+    commands, device commands such as `set heartbeat`, unsolicited events, SDO block transfer.
 
     Args:
         bus: bus on which the gateway executes the commands.
         net: number by which clients address this bus.
-        version: version of the gateway, which it answers to `info version`.
+        version: version that the gateway returns for the command `info version`.
     """
 
     def __init__(self, bus: NodeBus, net: int, version: str) -> None:

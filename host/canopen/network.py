@@ -76,7 +76,7 @@ class ErrorControl:
     Attributes:
         due_us: time at which `tick` must be called next.
         what: name of the protocol, `heartbeat` or `guarding`.
-        silence_us: time without a frame of the node after which it is lost, in microseconds.
+        silence_us: time without a frame of the node after which the node is lost, in microseconds.
     """
 
     def __init__(

@@ -8,7 +8,7 @@ from tickrig.wire.instant import NEVER
 class PeriodicTimer:
     """Timer that must be polled, and reports when a period has ended.
 
-    If it was not polled for several periods, it reports once.
+    If the timer was not polled for several periods, it reports only once.
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)

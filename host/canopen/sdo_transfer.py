@@ -25,8 +25,8 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
     Args:
         index: index of the object.
         sub: sub-index of the object.
-        size: size of the object in bytes, or 0 if it is unknown. It is used if an expedited answer
-            does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
+        size: size of the object in bytes, or 0 if it is unknown. The size is used if an expedited
+            answer does not indicate how many of the four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
         SdoAborted: the device refuses the request, or sends an unexpected answer.

@@ -181,7 +181,7 @@ def bus_and_rest(
 ) -> tuple[str | None, list[str]]:
     """Split the arguments of a command into the bus and the words after it.
 
-    If the option -c names the bus, all arguments are words after it.
+    If the option -c names the bus, the arguments contain no bus.
 
     Args:
         words: arguments of the command.
@@ -190,7 +190,8 @@ def bus_and_rest(
         most: maximum number of words after the bus, or None for any number.
 
     Returns:
-        The bus, or None if -c names it, and the words after the bus.
+        The bus, and the words after the bus. If the option -c names the bus, the first value is
+        None.
 
     Raises:
         click.UsageError: an argument is missing, or there are too many.

@@ -28,7 +28,7 @@ _PORT: Final = 2809
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """TCP address: that of an OpenRTM name server, or the one at which this process accepts peers.
+    """TCP address of an OpenRTM name server, or at which this process accepts connections.
 
     CORBA has no access control. Anyone who can connect to the address can do everything that
     rtshell can do.
@@ -176,8 +176,8 @@ def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
             have a topic.
 
     Raises:
-        Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 although this is not
-            requested.
+        Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 but the user did not
+            request this middleware.
     """
     return EngineOptions(_take_openrtm(options), _take_ros2(options, topics))
 

@@ -48,8 +48,9 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Context manager that turns errors of its block into a ClickException (exit status 1).
 
-    An error whose `status` is 3 becomes SourceFailed instead. Its `status` is the exit status of a
-    process that this command started. An error in writing standard output is not changed.
+    If an error has an attribute `status` of 3, the error becomes SourceFailed instead. The
+    attribute is the exit status of a process that the command started. Errors in writing standard
+    output are not changed.
     """
     try:
         yield
@@ -72,11 +73,12 @@ def refusing(
 ) -> Iterator[None]:
     """Context manager that turns errors of its block into Refused, which ends the command.
 
-    For an OSError, the message contains its path and reason, as in `refuse_path`.
+    For an OSError, the message contains the path and the reason of the error, as in `refuse_path`.
 
     Args:
         what: invalid option or argument, with which the message starts.
-        wrong: class of the errors to turn into Refused. Their text follows in the message.
+        wrong: class of the errors to turn into Refused. The text of the error follows in the
+            message.
         path: file that is wrong, if the text of the error does not name it.
     """
     try:
@@ -137,7 +139,7 @@ def show_findings(findings: Iterable[Finding]) -> None:
 def until_unread() -> Iterator[None]:
     """Context manager that ends its block without a message if nothing reads standard output.
 
-    An example is a command before `| head`.
+    For example, nothing reads it any more after `| head` has printed its lines.
 
     Raises:
         SourceFailed: standard output cannot be written, for example because the disk is full.

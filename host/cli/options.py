@@ -76,7 +76,7 @@ def refuse_idle(why: str, *names: str) -> None:
 
 
 class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type there
-    """Option type for one of several words. The message about another word suggests the nearest."""
+    """Option type for one of several words. For an unknown word, the error suggests the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read a word."""

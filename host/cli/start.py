@@ -214,8 +214,8 @@ def standard_streams() -> Iterator[None]:
 def raise_of_output(error: Exception) -> None:
     """Raise an error again if it came from writing standard output. Otherwise do nothing.
 
-    The caller can then report only errors of other kinds. If the reader has closed the pipe, as
-    before `| head`, the command ends without a message.
+    After this call, the caller reports the errors of all other kinds. If the reader has closed the
+    pipe, as `| head` does, the command ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]
@@ -233,8 +233,9 @@ def load(path: str) -> Any:
 def loading() -> Iterator[None]:
     """Context manager in which Ctrl-C ends the process at once, because nothing needs a clean-up.
 
-    It is used while modules are imported. If the caller has another handler for Ctrl-C, this
-    handler stays. In other threads than the main one, the context manager does nothing.
+    The context manager is used while modules are imported. If the caller has its own handler for
+    Ctrl-C, the handler is not replaced. Outside of the main thread, the context manager does
+    nothing.
     """
     handler = signal.getsignal(signal.SIGINT)
     owner = getattr(handler, "__self__", None)
@@ -252,8 +253,9 @@ def loading() -> Iterator[None]:
 class Interrupter:
     """Signal handler that raises KeyboardInterrupt, but not in the middle of an import.
 
-    An exception during an import may be lost in a callback of the importer, or leave a module half
-    loaded. Therefore the signal is repeated until the import has ended, for two seconds at most.
+    An exception during an import may be lost, or leave a module half loaded. Therefore the handler
+    repeats a signal that arrives during an import, until the import has ended, for two seconds at
+    most.
 
     Attributes:
         pending: number of the signal that is being repeated, or 0.
@@ -313,9 +315,9 @@ def _is_importing(frame: FrameType | None) -> bool:
 def taking_signals(received: _Handler) -> Iterator[None]:
     """Context manager in which Ctrl-C (SIGINT), SIGTERM and SIGHUP call the function `received`.
 
-    SIGINT is handled even if it was ignored at the start, because the shell of a script ignores it
-    for commands before `&`. SIGHUP stays ignored if it was ignored at the start, because nohup
-    requires that.
+    SIGINT is handled even if it was ignored at the start, because a script starts a command before
+    `&` with SIGINT ignored. SIGHUP stays ignored if it was ignored at the start, because nohup
+    needs this.
     """
     numbers = [signal.SIGINT, signal.SIGTERM]
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -331,8 +333,8 @@ def taking_signals(received: _Handler) -> Iterator[None]:
 def give_up_terminals() -> None:
     """Drop all further output to a terminal that is gone or accepts no data for half a second.
 
-    Otherwise a stopped terminal could prevent the command from ending. A `write` that already waits
-    for the terminal keeps waiting.
+    Without this call, a stopped terminal could prevent the command from ending. A call of `write`
+    that already waits for the terminal continues to wait.
     """
     for descriptor in (1, 2):
         if sys.platform != "win32" and _is_stuck(descriptor):

@@ -46,7 +46,7 @@ class RequestDispatcher:
             return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
-        """Execute a request and return its answer, with `ok` and either the result or `error`."""
+        """Execute a request. The answer has the key `ok`, and either the result or an `error`."""
         head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}

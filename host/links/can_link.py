@@ -90,8 +90,8 @@ def to_frame(message: can.Message) -> CanFrame | None:
 def to_fd_frame(message: can.Message) -> FdFrame | None:
     """Convert a python-can message to a CAN FD frame. For any other frame, return None.
 
-    The frame is not validated, because python-can reads a CAN FD frame without data in an ASC log
-    as a remote frame, although CAN FD has no remote frames.
+    The frame may be invalid: from an ASC log, python-can reads a CAN FD frame without data as a
+    remote frame, although CAN FD has no remote frames.
     """
     if not message.is_fd or message.is_error_frame:
         return None
@@ -114,12 +114,14 @@ _DRIFT: Final = 5_000
 class StampClock:
     """Converter from time stamps of a CAN driver to arrival times on the clock of this host.
 
-    The driver's clock starts at an unknown time (1970, or power-on), and it drifts. A frame is read
-    after its arrival. Therefore the smallest difference seen between reading time and time stamp is
-    taken as the offset of the two clocks.
+    The clock of the driver starts at an unknown time (1970, or power-on) and drifts, so the
+    converter estimates the offset between the two clocks. The difference between the reading time
+    and the time stamp of a frame contains the offset and a delay. Therefore the smallest difference
+    is used as the offset.
 
-    A frame cannot have arrived before the last poll that found no frame. Therefore wrong time
-    stamps, or a jump of the driver's clock, cause wrong times only while the host is late.
+    A frame cannot have arrived before the last poll that found no frame, so this poll limits the
+    result. If the time stamps are wrong, or the clock of the driver jumps, the results are
+    therefore wrong only while the host is late.
 
     >>> clock = StampClock()
     >>> clock.at_us(7.0, 0, 100), clock.at_us(7.3, 100, 900_000)  # stopped for 0.9 s
@@ -203,11 +205,10 @@ def _enlarge_queue(sock: socket.socket) -> None:
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
     """Set up a python-can bus: enlarge its receive queue, and filter out foreign multicast groups.
 
-    python-can binds the socket of `udp_multicast` only to a port. Linux then delivers data on that
-    port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
-    systems have no such option and do not need it.
+    A socket of `udp_multicast` would otherwise receive, on Linux, the data of every group that a
+    program on this machine has joined on the same port (ip(7), IP_MULTICAST_ALL).
 
-    The driver of socketcand also logs the exceptions that it raises, with a traceback. Those log
+    The driver of socketcand logs each exception that it raises, with a traceback. These log
     messages are dropped, because the reader of the bus reports the exceptions.
     """
     let_wait(bus)
@@ -377,7 +378,7 @@ def _odd(message: can.Message) -> str:
 
 
 def reason_of(error: Exception) -> str:
-    """Describe an exception of a CAN driver in one line, with its type if it is no bus error."""
+    """Describe an exception of a CAN driver in one line. Name its type unless it is a bus error."""
     text, kind = first_line(error), type(error).__name__
     return text if isinstance(error, can.CanError | OSError) or text == kind else f"{kind}: {text}"
 
@@ -503,8 +504,9 @@ class CanLink:
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for the next frame, then return all received frames with their arrival times.
 
-        The returned time was read before the last poll of the bus. If the process is stopped after
-        this poll, it can thus detect its delay, and does not count nodes as silent.
+        The returned time is the time just before the last poll of the bus. If the process is
+        stopped after this poll, the caller can detect the delay by this time, and so does not count
+        nodes as silent.
 
         Args:
             timeout_us: longest wait in microseconds. 0 does not wait.

@@ -16,10 +16,10 @@ ECHO_US: Final = 1_000_000
 
 
 class EchoFilter:
-    """Filter that recognizes the echo of the host's own frames, on a bus that also delivers these.
+    """Filter that recognizes the host's own frames on a bus that returns them as an echo.
 
-    If an equal frame of another node arrives before the echo, that frame counts as the echo, and
-    the echo counts as the frame of the other node.
+    If another node sends an equal frame that arrives before the echo, the filter takes this frame
+    for the echo, and the echo for the frame of the other node.
     """
 
     def __init__(self) -> None:
@@ -91,5 +91,5 @@ class EchoFreeLink:
 
 
 def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
-    """Return a link that drops the echo of its own frames, or the given link if it has none."""
+    """Return a link that drops the echo of its own frames: the given link if there is no echo."""
     return EchoFreeLink(link) if interface in ECHOING else link

@@ -23,7 +23,7 @@ TRACEBACK: Final = "Traceback (most recent call last)"
 def first_line(error: BaseException) -> str:
     r"""Return the text of an exception in one line, without an embedded traceback.
 
-    If it has no text, return the name of its type.
+    If the exception has no text, return the name of its type.
 
     >>> first_line(ValueError("bad frame\nTraceback (most recent call last):\n  File x"))
     'bad frame'
@@ -79,8 +79,8 @@ class Link(Protocol[W]):
     """Connection between a proxy and its device, which may be real or emulated, with a clock.
 
     A proxy is the host's object for a device. It reads the time from its link, never from the clock
-    of the machine. On a rig in virtual time, the same proxy waits a minute of virtual time within a
-    millisecond.
+    of the machine. If the emulated device runs in virtual time, the same proxy waits a minute of
+    virtual time within a millisecond.
     """
 
     @property
@@ -118,7 +118,7 @@ class StampedLink(Link[Frames], Protocol):
     """
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for the next frame. Return the time, and all frames that have arrived by then.
+        """Wait for the next frame. Return a time, and all frames that have arrived by this time.
 
         Raises:
             LinkClosed: the connection to the bus is lost.

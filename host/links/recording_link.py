@@ -68,7 +68,7 @@ class RecordingLink(Generic[W]):
             traffic: bytes or CAN frames.
 
         Raises:
-            LinkClosed: the connection is lost. What was not sent is not recorded.
+            LinkClosed: the connection is lost. The traffic that was not sent is not recorded.
         """
         at_us = self._link.now_us
         self._link.send(traffic)

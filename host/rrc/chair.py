@@ -361,7 +361,7 @@ class Chair(Closing):
         return events
 
     def ask_if_silent(self) -> None:
-        """Check that the RRC still answers, by a query, if no status line has arrived for a second.
+        """If no status line came for a second, check by a query that the RRC still answers.
 
         A missing status line alone is no error, because the RRC sends none while the wheelchair
         (VR2) is off.
@@ -408,7 +408,7 @@ class Chair(Closing):
     def stop(self) -> None:
         """Stop the motors, and wait for a status line that confirms the stop.
 
-        If no status line confirms the stop, the wheelchair (VR2) is switched off.
+        If no status line confirms the stop, this method switches the wheelchair (VR2) off.
         """
         if not self.moved:
             return

@@ -146,7 +146,8 @@ class RrcLoad:
 
     Attributes:
         load_pct: load in per cent: 30 for the RRC's own work, plus the cost of the lines.
-        margin_pct: remaining capacity, 100 minus `load_pct`. The client leaves 10 or more.
+        margin_pct: remaining capacity in per cent, 100 minus `load_pct`. The client keeps 10 or
+            more free.
         pace_lines_s: maximum number of lines per second without waiting for answers.
     """
 

@@ -340,7 +340,7 @@ class RrcClient(Closing):
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
-        """Switch the RRC's stablemode on or off, which protects lines by a checksum.
+        """Switch the stablemode of the RRC on or off. Stablemode protects lines by a checksum.
 
         With stablemode, the client appends the checksum (CHECK) to each line, and the RRC does not
         confirm commands with OK lines.
@@ -379,11 +379,11 @@ class RrcClient(Closing):
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
-        """Let this program drive, and select the slowest speed mode first if the stick was driving.
+        """Let this program drive. If the stick was driving, select the slowest speed mode first.
 
-        The RRC manual advises the slowest speed mode for each change of the driver (between `limit`
-        and `output`). The first `output` after the change waits for the confirmation. Select the
-        wanted speed mode again afterwards.
+        The RRC manual advises the slowest speed mode whenever the driver changes, that is, between
+        the commands `limit` and `output`. The first command `output` after the change waits for the
+        confirmation. Select the wanted speed mode again afterwards.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.
@@ -400,7 +400,7 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Let the stick drive, and select the slowest speed mode first if this program was driving.
+        """Let the stick drive. If this program was driving, select the slowest speed mode first.
 
         The arguments are the same as those of `limit`: v_pct, w_pct, sum_pct, product_pct,
         radius_pct.

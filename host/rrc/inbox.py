@@ -68,9 +68,9 @@ class Arrival(Generic[_T]):
 class Inbox:
     """Store of the received events and status lines that the program has not read yet.
 
-    Replies to commands are not stored. The inbox returns them to its caller. Lines that the manual
-    does not list, and SA lines with a wrong CHECK, are kept in `unknown` and reported without an
-    error, because newer firmware or noise on the line can cause them.
+    Replies to commands are not stored, but returned to the caller. Lines that the manual does not
+    list, and SA lines with a wrong CHECK, are kept in `unknown` and reported without an error,
+    because newer firmware or noise on the line can cause them.
 
     Args:
         on_unknown: function that is called with each unknown line.
@@ -148,7 +148,8 @@ class Exchange:
         stable: whether stablemode is on when the command is sent.
 
     Attributes:
-        lines: lines to send, as bytes. In stablemode, a query follows a command without an answer.
+        lines: lines to send, as bytes. In stablemode, some commands get no answer, so a query is
+            sent after such a command.
         text: answer to a query, empty for other commands.
         refusal: reason of the RRC's refusal, or None without a refusal.
         done: whether the last expected line has arrived.

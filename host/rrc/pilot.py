@@ -34,7 +34,7 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return the translation and rotation to drive, in per cent, or 0 while no button is held.
+        """Return the translation and rotation to drive, in per cent: 0 while no button is held.
 
         The method raises ChairStopped if the game pad is gone.
         """

@@ -62,8 +62,10 @@ class StepResult:
 
     Attributes:
         step: title of the step.
-        sent: command line that the step sends, without CHECK. It is empty if the step sends none.
-        check: CHECK (checksum) of that line, empty in the first round, which has no CHECK.
+        sent: command that the step sends to the RRC, without CHECK. It is empty if the step sends
+            no command.
+        check: CHECK (checksum) of the command. It is empty in the first round of the procedure, in
+            which commands have no CHECK.
         passed: whether the RRC behaved as described in the manual.
         reason: reason of a failure, empty if the step passed.
     """
@@ -86,7 +88,7 @@ class Procedure:
     The procedure has two rounds of steps, first without stablemode and then with it.
 
     Args:
-        chair: chair whose watchdog is set, without stablemode.
+        chair: chair to test. Its watchdog must be on, and its stablemode must be off.
         operator: person at the chair, who gets instructions and answers questions.
         report: function that is called with the result of each step.
 

@@ -172,10 +172,9 @@ class _UnconfirmedCommands:
     def carried_out(self, name: str) -> Command | None:
         """Remove the command that an OK confirms, and return the newest command of that name.
 
-        The OK belongs to the oldest waiting command of that name. The newest one is returned
-        because its values will apply: the RRC has executed it or will execute it. There is one
-        exception: the RRC lost its power together with older commands, and this OK is the reply to
-        the newest command.
+        The OK confirms the oldest waiting command of that name, which is removed. The newest
+        waiting command of that name is returned, because the RRC executes it last and its values
+        will then apply.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:
@@ -208,7 +207,7 @@ class _UnconfirmedCommands:
 
 
 class ReplyMatcher:
-    """Assigns each reply of the RRC to the command it answers, and keeps track of its settings.
+    """Assigns each reply of the RRC to the answered command, and records the settings of the RRC.
 
     Args:
         max_refusals: number of refusals in a row that counts as too many, 1 or more.
@@ -256,7 +255,8 @@ class ReplyMatcher:
     def initialized(self) -> None:
         """Record that the RRC was initialized (EV:Initialized) and has lost all settings.
 
-        A command that was still in the receive buffer of the RRC is executed afterwards.
+        Earlier commands may still be in the receive buffer of the RRC, which executes them
+        afterwards.
         """
         self.settings.clear()
         self.refusals.clear()

@@ -39,7 +39,7 @@ _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """Record of a received signal. Loops check it and end, so a signal interrupts no call.
+    """Record of a received signal. Loops check this record and end after a signal.
 
     Attributes:
         number: number of the first signal, or 0 if no signal was received.
@@ -60,7 +60,7 @@ def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
 
     Args:
         ended: object that records the signals.
-        stable: whether stablemode is switched on. An option of the command line can prevent this.
+        stable: whether to switch stablemode on, unless an option of the command line prevents it.
 
     Raises:
         click.ClickException: the command failed. The message is one line, and the exit status is 1

@@ -146,7 +146,7 @@ class ComponentAction:
         return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Do further work of a period in Active, after on_execute of all components in `ec`."""
+        """Do further work of an Active period, after on_execute of all components in `ec`."""
         return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
@@ -472,8 +472,8 @@ class ExecutionContexts:
     """Group of execution contexts that a schedule ticks one after the other.
 
     The contexts run in the order in which they were added. The group stores the earliest due time
-    of its contexts. A tick before that time skips the contexts, because checking 127 contexts would
-    take 11 us.
+    of its contexts. If a tick comes before that time, the contexts are not checked, which saves
+    time.
 
     Attributes:
         quiet_us: time in us of the latest tick in which no context was due. The contexts do not
@@ -632,7 +632,7 @@ class ExecutionContext:
     def join(self, others: ExecutionContexts) -> None:
         """Make this execution context a member of a group that a schedule ticks.
 
-        `ExecutionContexts.add` and `ExecutionContexts.remove` call this method.
+        The methods `ExecutionContexts.add` and `ExecutionContexts.remove` call this method.
 
         Args:
             others: group of contexts, which is notified when the due time of this context changes.
@@ -640,7 +640,7 @@ class ExecutionContext:
         self._ticked_us, self._others = self.now_us, others
 
     def close(self) -> None:
-        """Deactivate all components of the context at once, stop it, and remove them from it."""
+        """Deactivate all components at once, stop the context, and remove the components."""
         for participant in self._participants:
             participant.leave()
         self.stop()
@@ -756,7 +756,7 @@ class ExecutionContext:
         """Request that a component moves from Inactive or Active to Error in the next period.
 
         A component that represents a device uses this when the device fails. OMG RTC has no such
-        request: there, only a callback that fails leads to Error.
+        request. In OMG RTC, a component moves to Error only if a callback fails.
 
         Args:
             component: component to abort.

@@ -199,10 +199,9 @@ DEFAULT: Final = "default"
 class Configuration:
     """The configuration sets of a component, each with values for its parameters.
 
-    One set is active.
-
-    A change is checked at once. The component gets the changed values before the callbacks of its
-    next period, at `initialize`, or when `update` is called.
+    One set is active, and the component uses its values. A change is checked at once. The component
+    gets the changed values before the callbacks of its next period, at `initialize`, or when
+    `update` is called.
 
     Attributes:
         active_id: ID of the set whose values the component uses, or will use after the next update.
@@ -286,7 +285,7 @@ class Configuration:
         """Remove a configuration set.
 
         Raises:
-            RtcRefused: the set is unknown, the set `default`, or the active set.
+            RtcRefused: the set is unknown, or it is the set `default` or the active set.
         """
         self._set(set_id)
         if set_id in (DEFAULT, self.active_id):

@@ -50,7 +50,7 @@ class DeviceComponent(RtComponent, ABC, Generic[C]):
         """
 
     def release(self, ec: ExecutionContext) -> None:
-        """Do final work with the device before the client is closed. By default, do nothing."""
+        """Do final work with the device before the client is closed. The default does nothing."""
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Open the client, also after Error."""

@@ -86,7 +86,7 @@ def open_conform_source(
     Args:
         word: SOURCE argument of the command line, such as `can0`, `slcan:/dev/ttyACM0@500k` or a
             rig file `bench.toml`, or None if the options name a bus.
-        node_id: node-ID of the node under test. If the rig has several buses, the one with this
+        node_id: node-ID of the node under test. If the rig has several buses, the bus with this
             node is used. None selects the first bus.
         options: bus options of the command line, such as interface and bit rate.
 

@@ -111,8 +111,8 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
     """Return the text of the output file that an option of `canmon conform` requests.
 
     Args:
-        option: name of the option: `--html`, `--junit`, `--badge` or `--issue`. For any other name
-            the text is a baseline file with the failures of the run.
+        option: name of the option: `--html`, `--junit`, `--badge` or `--issue`. For any other name,
+            the result is the text of a baseline file with the failures of the run.
         report: report of the run.
         baseline: failures that the user has declared as known.
         show: function that formats the recorded frames as lines.
@@ -138,9 +138,9 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 def decoded_frames(eds: Mapping[int, Path]) -> ShowFrames:
     """Return a function that formats the recorded frames of a check and their meaning.
 
-    Each call of this function decodes the frames of one check. It starts with the EDS only: SDO
-    transfers and PDO mappings of earlier checks are unknown, because the frames between two checks
-    are not recorded.
+    Each call of the returned function decodes the frames of one check. Only the EDS is known at the
+    beginning of a call. SDO transfers and PDO mappings of earlier checks are unknown, because the
+    frames between two checks are not recorded.
 
     Args:
         eds: EDS file, or the objects that were read from it, by node-ID.

@@ -47,8 +47,8 @@ _INPUTS: Final = {"6000": "di", "6401": "ai"}
 class LinearConverter(NamedTuple):
     """Linear conversion between an input of a device and the CANopen object that shows this input.
 
-    While the input goes from `low` to `high`, the object goes from `first` to `last` in steps of
-    `step`.
+    When the input changes from `low` to `high`, the value of the object changes from `first` to
+    `last` in steps of `step`.
     """
 
     low: float
@@ -462,9 +462,9 @@ class Consent:
     def confirm(self, question: str) -> bool:
         """Ask the user a yes-or-no question. Return True for yes.
 
-        `--yes` answers yes without a question. Without a terminal, the answer is no. In a rig in
-        virtual time the answer is yes, except for LSS commands to all nodes while other nodes are
-        on the bus, because these nodes would also answer.
+        With the option `--yes`, the answer is yes without a question. Without a terminal, the
+        answer is no. If the node is emulated in virtual time, the answer is yes. The only exception
+        are LSS commands to all nodes, to which other nodes on the bus would also answer.
         """
         if self._yes:
             return True

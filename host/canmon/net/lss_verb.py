@@ -34,10 +34,10 @@ class LssSettings:
         only_node: whether the command addresses the only slave on the bus, without an LSS address.
         node_ids: new node-IDs, one for each slave, or empty to keep the node-IDs.
         bit_rate: new bit rate in bit/s, or None to keep the bit rate.
-        delay_ms: delay before the slaves switch to the new bit rate in milliseconds, or None not to
-            switch.
+        delay_ms: delay in milliseconds before the slaves switch to the new bit rate. With None,
+            they do not switch.
         store: whether the slaves store their node-ID and bit rate.
-        dry_run: whether to only show what would be done, and leave the slaves unchanged.
+        dry_run: whether the command only shows what it would do, and does not change the slaves.
     """
 
     address: LssAddress | None = None

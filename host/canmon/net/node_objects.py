@@ -72,7 +72,7 @@ class NamedObjects:
         node_id: node-ID of the node.
         file: EDS file of the node, or None for no file.
         known: description of the device, if it is known without a file.
-        name: name of the EDS that `known` is from.
+        name: name of the EDS from which the description `known` comes.
 
     Attributes:
         node_id: node-ID of the node.
@@ -193,7 +193,8 @@ def known_objects(
 ) -> NamedObjects:
     """Return the names and types of the objects of a node, from the EDS that describes it.
 
-    The device type, and with an EDS also the identity, is read from the node.
+    The function reads the device type from the node. If there is an EDS, it also reads the
+    identity.
 
     Args:
         session: session with the open bus.
@@ -351,7 +352,7 @@ def differences(
 ) -> Iterator[_ValueDifference]:
     """Read objects of a node, and yield each object whose value differs from the wanted value.
 
-    An object that cannot be read is yielded, too.
+    Objects that cannot be read are also yielded.
 
     Args:
         session: session with the open bus.

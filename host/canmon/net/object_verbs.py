@@ -292,8 +292,8 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
     Args:
         session: session with the open bus.
         node_id: node-ID of the node.
-        sub: sub-index of 1010h: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh. Further
-            sub-indices are manufacturer-specific.
+        sub: sub-index of 1010h: 1 for all parameters, 2 for the objects 1000h to 1FFFh, 3 for the
+            objects 6000h to 9FFFh. Further sub-indices are manufacturer-specific.
 
     Raises:
         NodeFailed: the node cannot store these parameters.
@@ -329,8 +329,8 @@ def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
 def reset(session: NetSession, node_id: int, sub: int) -> None:
     """Reset a node after its parameters were restored, and wait for its boot-up.
 
-    `sub` is the sub-index of 1011h that was written. If it is that of the communication parameters,
-    only the communication of the node is reset.
+    `sub` is the sub-index of 1011h that was written. If only the communication parameters were
+    restored, only the communication of the node is reset.
     """
     communication = sub == _COMMUNICATION
     command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE

@@ -140,8 +140,8 @@ def net_session(call: NetCall, node_id: int | None = None) -> Iterator[NetSessio
 
     Args:
         call: options of the command, which name the bus.
-        node_id: node-ID of the node, which selects the bus if a rig has several. None selects the
-            first bus.
+        node_id: node-ID of the node. If a rig has several buses, the bus with this node is opened.
+            None selects the first bus.
 
     Raises:
         Refused: the source is not a bus with nodes.

@@ -27,7 +27,7 @@ from tickrig.host.text.whole_file import replacing, write_whole
 
 
 def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
-    """Write the visible samples of curves as CSV: a row for each time, a column for each curve.
+    """Write the visible samples of curves as CSV, with a row per time and a column per curve.
 
     A cell is empty if a curve has no sample at that time. If a curve has several samples at that
     time, the last sample is written. Times are seconds with six decimals, as in the log.
@@ -168,7 +168,7 @@ def write_graph(
         title: title of a picture.
 
     Raises:
-        Refused: matplotlib is not installed, which a PNG needs.
+        Refused: the file is a PNG, which needs matplotlib, and matplotlib is not installed.
         SourceFailed: the file cannot be written.
     """
     try:

@@ -148,10 +148,11 @@ def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Clock of a live source, in microseconds on the clock of the frames' time stamps.
+    """Clock that continues the time stamps of a live source while no frame arrives.
 
-    The clock continues from the time stamp of the latest frame, and runs with the clock of this
-    machine. Both clocks may differ, so only differences between times of one clock are used.
+    The time is that of the latest time stamp, plus the time that has passed since then on the clock
+    of this machine, in microseconds. The two clocks may show different times, so only time
+    differences of the machine's clock are used.
 
     Attributes:
         latest_us: time stamp of the latest frame in microseconds.
@@ -182,7 +183,7 @@ _SLACK_NS: Final = 1_000
 class Pace:
     """Clock for actions at given times, in microseconds since its creation.
 
-    The clock waits until absolute times, so that repeated actions do not drift.
+    Each wait ends at an absolute time, so that the times of repeated actions do not drift.
     """
 
     def __init__(self) -> None:
@@ -246,7 +247,7 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 def expect_frames(source: AnySource[object], meaning: FilteredDecoder | None = None) -> None:
     """Exit with status 1 if no frame of a log passed the filters or the time range.
 
-    `report` prints the message about this.
+    The function `report` prints the message about this.
     """
     nothing = source.nothing_passed or (meaning is not None and meaning.nothing_passed)
     if nothing and (source.recorded or not source.live):
@@ -295,7 +296,7 @@ class _Interruptions(Interrupter):
 def until_interrupted() -> Iterator[_Interruptions]:
     """Context manager whose block ends at Ctrl-C or a termination signal.
 
-    The program then continues.
+    After the block, the program continues.
     """
     interruptions = _Interruptions()
     # In this order, Ctrl-C before the block ends the command.
@@ -320,7 +321,7 @@ span_option: Final = time_option(
 def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
     """Return the nominal and the data bit rate of a bus.
 
-    They come from the options, or from a SOURCE word such as can0@500k/2M.
+    The options give the bit rates, or a SOURCE word such as can0@500k/2M.
     """
     buses = [word for word in map(parse_source, words) if isinstance(word, BusSpec)]
     nominal = [options.bitrate, *(bus.bitrate for bus in buses)]
@@ -362,7 +363,7 @@ def listen(
 ) -> None:
     """Read a source and pass its frames to `take`, until the source ends or `span_us` has passed.
 
-    For a log, the time is counted by the times of its frames.
+    For a log, `span_us` is a time span of the log, measured by the times of its frames.
     """
     begin_s, last_us = time.monotonic(), None
     while not (source.ended or (source.live and _is_over(begin_s, span_us))):
@@ -413,7 +414,7 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
 def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot | None:
     """Return the traffic statistics of a log that is read in blocks.
 
-    The result is None if there is no such log, or it must be read frame by frame.
+    The result is None if no log can be read in this way, or the log must be read frame by frame.
     """
     if log is None:
         return None

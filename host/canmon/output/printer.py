@@ -62,9 +62,9 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return a cut of the same part of a log, which also shows earlier frames to the decoder.
+        """Return a cut of the same part of a log that also passes earlier frames to the decoder.
 
-        The decoder learns from the frames before the part, but does not return them.
+        The decoder learns from the frames before the part, but does not return these frames.
         """
         if self._decoder is None or cut.begin is None:
             return cut
@@ -96,7 +96,7 @@ class FilteredDecoder:
     def messages(self) -> list[str]:
         """Return one line for each signal or kind of frame in the filter that never occurred.
 
-        If all of them occurred, the line reports that no frame passed.
+        If all signals and kinds of frames occurred, return a line that states that no frame passed.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
@@ -225,8 +225,8 @@ class BlockPrinter:
 
     Args:
         output: format of the output, which is text or a log.
-        lines: formatter of single lines. Both may be used in turn, because each continues where the
-            other one ended.
+        lines: formatter of single lines. The two formatters may be used in turn, because each
+            continues where the other formatter ended.
         decoder: decoder of frames, or None for no decoding. Other code may decode frames with it
             between two calls.
     """
@@ -256,9 +256,9 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 class StdoutWriter:
     """Writer that prints frames on standard output in the format of `canmon dump`.
 
-    In JSON and in a log, events between frames are also lines. A log and CSV are written with
-    unchanged characters, so that other programs can read them again exactly. This does not apply to
-    a terminal.
+    If the format is JSON or a log, each event between frames is also a line. A log and CSV keep
+    their control characters, so that other programs can read the same text again. On a terminal,
+    control characters are replaced.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:

@@ -134,8 +134,8 @@ class LogFile:
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
     """Context manager that yields a path for a log, which replaces `path` when it is complete.
 
-    If the source is not a file, writing may take long, and other programs may read the log during
-    that time. In this case, the log is written to `path` directly.
+    If the source is not a file, the log is written to `path` directly, because writing may take
+    long and other programs may read the log during this time.
 
     Raises:
         Refused: the name of the file indicates no format, or the file is being read.

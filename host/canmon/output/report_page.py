@@ -68,8 +68,8 @@ class Verdict(NamedTuple):
 
     Attributes:
         diagnosis: result of the diagnosis.
-        around: excerpt of the log around a frame, by the number of that frame. The excerpt is the
-            number of its first frame, and its frames.
+        around: excerpt of the log around a frame, by the number of that frame. An excerpt consists
+            of the number of its first frame, and of its frames.
     """
 
     diagnosis: Diagnosis
@@ -83,8 +83,8 @@ class ReportHead:
     Attributes:
         title: title of the page.
         source: description of the source, such as the name of the log.
-        about: information at the end of the page: pairs of a text and an addition that is shown as
-            code.
+        about: information at the end of the page. Each item has a text, and a second text that is
+            shown as code.
         bit_rate: bit rate of the buses in bit/s, or None if unknown.
     """
 

@@ -153,13 +153,14 @@ _STEPPED: Final = ("tickrig",)
 def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
     """Open a CAN bus with python-can.
 
-    The interface is that of the options, else of python-can's configuration, else a default.
+    The interface comes from the options. If the options name none, it comes from the configuration
+    of python-can, and otherwise it has a default.
 
     Returns:
         The bus, its interface, and the name of its channel.
 
     Raises:
-        Refused: an option is unknown to python-can.
+        Refused: python-can does not know an option.
         SourceFailed: the bus cannot be opened.
     """
     bus, interface, channel = open_raw(_with_interface(options))
@@ -188,7 +189,7 @@ class BusReader:
 
     Attributes:
         reads: object that reads single frames, and counts frames that the driver could not read.
-        lost: number of lost frames, which is 0 because python-can does not report it.
+        lost: number of lost frames, which is always 0 because python-can does not report losses.
         tally: counts of items that are not frames.
         stepped: whether virtual time passes only while the bus is read.
     """
@@ -272,8 +273,8 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
 
     The word overrides the options.
 
-    If `-i` names the interface, the whole word is the channel, including colons, unless the word
-    begins with that interface.
+    If the option `-i` names the interface, the whole word is the channel, even if it contains
+    colons. A word that begins with this interface is an exception.
 
     Raises:
         Refused: the word and -c name different channels.
@@ -343,7 +344,7 @@ class Transmitter:
         """Send a frame.
 
         Raises:
-            SourceFailed: the bus is gone, was blocked for 1 s, or does not support CAN FD.
+            SourceFailed: the bus is gone, accepted no frame for 1 s, or does not support CAN FD.
         """
         if isinstance(frame, FdFrame) and not self._takes_fd:
             raise SourceFailed(f"cannot send {frame} on {self.name}: CAN FD wants --fd")
@@ -386,7 +387,7 @@ def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
         frame: frame to send.
 
     Raises:
-        SourceFailed: the bus is gone, or it was blocked for 1 s.
+        SourceFailed: the bus is gone, or accepted no frame for 1 s.
     """
     try:
         bus.send(to_message(frame), _SEND_TIMEOUT_S)

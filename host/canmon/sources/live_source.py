@@ -64,11 +64,11 @@ class Reader(Protocol[_Read_co]):
 
 
 class LiveSource(AnySource[_Item]):
-    """Source of frames from one or more buses or serial ports. A thread reads each of them.
+    """Source of frames from one or more buses or serial ports, each of which has its own thread.
 
     Frames wait in a queue of limited size until the caller fetches them. If the queue is full,
-    further frames are lost and counted. A bus in virtual time has no thread: the caller itself
-    reads it, because time passes while it polls.
+    further frames are lost and counted. A bus in virtual time has no thread. The caller reads such
+    a bus by `poll`, and its time passes during this call.
 
     Args:
         readers: readers of the open buses and ports.
@@ -275,7 +275,7 @@ class ReopeningReader(Generic[_Item]):
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
         """Wait at most `timeout_us` for a first frame, and return the frames that have arrived.
 
-        Marks in the result report that the bus went away, or that it is back.
+        If the bus went away or is back, the result contains marks that report this.
 
         Raises:
             LinkClosed: the bus is gone, and `wanted` is not set.

@@ -62,7 +62,7 @@ class AnySource(Generic[_Taken_co]):
             already, as in a log.
         failed: reason why the source ended early, empty for none.
         marks: events after the frames that the last `poll` returned.
-        recorded: whether a recorder wrote these marks into a log and has already reported them.
+        recorded: whether a recorder has already written the marks into a log and reported them.
         buses: open buses of the source by name, on which frames can be sent.
     """
 
@@ -126,7 +126,7 @@ class AnySource(Generic[_Taken_co]):
     def nothing_passed(self) -> bool:
         """Whether the source has frames, but none passed its filters.
 
-        Filters are those of SOURCE words, and the wanted part of a log.
+        The filters are those in the SOURCE words, and the wanted part of a log.
         """
         return self._cut is not None and self._cut.empty
 
@@ -176,12 +176,12 @@ class FileSpec:
 class BusSpec:
     """A CAN bus as a SOURCE word of the command line names it, with a filter for its frames.
 
-    Attributes that are None are taken from the options of the command. If there is a data bit rate,
-    the bus is a CAN FD bus.
+    If an attribute is None, the options of the command give the value. A bus with a data bit rate
+    is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon of the word. If `-i` names the interface, this text is
-            part of the channel.
+        prefix: text before the first colon of the word. If the option `-i` names the interface,
+            this text is a part of the channel.
     """
 
     interface: str | None = None
@@ -570,7 +570,7 @@ class BlockLog(AnySource["Columns"]):
     Each `poll` returns one block, and only one block is in memory.
 
     Attributes:
-        no_columns: whether reading ended early, because this log must be read frame by frame.
+        no_columns: whether reading has ended early because this log must be read frame by frame.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -628,7 +628,8 @@ class PieceLog(_LoggedSource):
     def pieces(self) -> Iterator[Columns | Sequence[Record]]:
         """Yield the pieces of the file.
 
-        After each piece, `lost` and `marks` are those at its end.
+        After each piece, the attributes `lost` and `marks` have their values at the end of the
+        piece.
         """
         ahead: Columns | Sequence[Item] | None = ()
         while not self._ended:
@@ -667,7 +668,8 @@ def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
 
     Args:
         words: SOURCE words.
-        cut: wanted part of the log. If it passes earlier frames to a decoder, the result is None.
+        cut: wanted part of the log. If the part passes earlier frames to a decoder, the result is
+            None.
 
     Raises:
         Refused: the words do not name a source.
@@ -701,7 +703,7 @@ def open_source(
 ) -> Source:
     """Open the source that SOURCE words name, for a command that reads only CAN frames.
 
-    The function is `open_any` without serial ports.
+    Serial ports are refused. Apart from this, the function is the same as `open_any`.
     """
     source = open_any(words, options or BusOptions(), cut, lines_too=False)
     return cast("Source", source)  # without lines: frames
@@ -717,7 +719,8 @@ def open_any(
     Args:
         words: SOURCE words of the command. Without words, the options name a bus.
         options: interface, bit rate and other options of the buses.
-        cut: wanted part of the files or of standard input. A part of a bus is refused.
+        cut: wanted part of the files or of standard input. A bus cannot be cut, so such a part is
+            refused.
         lines_too: whether serial ports are allowed.
 
     Raises:

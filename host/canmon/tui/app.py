@@ -72,7 +72,8 @@ class RecorderTask(Task):
 
     Attributes:
         section: name of the recorder's table in the workspace.
-        words: text of the recording's settings, with the same arguments as for `canmon dump -l`.
+        words: settings of the recording as a text, which has the same form as the arguments of
+            `canmon dump -l`.
         recorder: present or last recorder, or None before the first recording.
     """
 
@@ -184,9 +185,10 @@ _ALARM: Final = "bold red"
 
 
 class StatusLine(Widget):
-    """The status line of the monitor: armed or not, buses with load, counts, and faults.
+    """The status line of the monitor, with the state of the session in one line of text.
 
-    A click on the first word arms or disarms the session, which allows or stops sending.
+    The line shows whether sending is armed, the buses with their loads, counts of frames, and
+    faults. A click on the first word arms or disarms sending.
 
     Args:
         session: the session whose status it shows.
@@ -391,8 +393,8 @@ class MonitorApp(FramedApp):
         session: session with the traffic and the buses to send on. The caller of the app starts the
             session.
         panels: panels, each of which is one tab.
-        panel_settings: storage of the panels' settings. None means that settings are stored only on
-            export.
+        panel_settings: storage of the panels' settings. If it is None, settings are stored only
+            when the user exports them.
         recorder: recorder of the monitor. By default, a new recorder is used.
 
     Attributes:
@@ -736,7 +738,7 @@ class MonitorApp(FramedApp):
         self.recorder.trigger()
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Yield the entries of Textual's command palette: the tabs, and the keys that are shown.
+        """Yield the entries of Textual's command palette, which are the tabs and the shown keys.
 
         The keys are those of the app and of the visible panel.
         """

@@ -146,14 +146,15 @@ class Task(Protocol):
 
     @property
     def due_us(self) -> int:
-        """Time at which the session calls the task next, even if no frame arrives, or `NEVER`."""
+        """Time at which the session calls the task even if no frame arrives, or `NEVER`."""
         return NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
         """Process new frames, and return the frames to send.
 
         Args:
-            now_us: present time of the session, which is not the clock of the frames' time stamps.
+            now_us: present time on the clock of the session. The time stamps of the frames have
+                another clock.
             records: frames since the last call, including frames that this program sent.
         """
 
@@ -273,7 +274,7 @@ class Session:
     def over(self, model: Model) -> Session:
         """Return a new session that reads the same source into another model.
 
-        This session must be closed first.
+        Close the present session before you call this method.
         """
         session = Session(self.source, model, self.buses, self._clock)
         session.words = self.words
@@ -309,7 +310,7 @@ class Session:
     def step(self, timeout_us: int = 0) -> None:
         """Wait for a frame or a due task, then process all frames that have arrived.
 
-        The tasks process the frames, too, and the frames that they return are sent. `timeout_us` is
+        The tasks also get the frames, and may return frames, which are then sent. `timeout_us` is
         the longest time to wait.
         """
         due_us = min((task.due_us for task in self.tasks), default=NEVER)

@@ -139,7 +139,7 @@ def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None)
 
     Args:
         texts: text of each field by its name.
-        before: present settings. Their options without a field are kept.
+        before: present settings. Options that have no field on the screen are kept.
 
     Raises:
         InputError: the text of a field is invalid.
@@ -211,8 +211,8 @@ class SettingsScreen(ModalScreen[None]):
 
     Args:
         settings: the present settings.
-        apply: function that is called with the entered settings. It raises InputError if they
-            cannot be used.
+        apply: function that is called with the entered settings. It raises InputError if the
+            settings cannot be used.
     """
 
     HELP = """

@@ -92,7 +92,8 @@ filter_option: Final = click.option(
 def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
     """Read the EDS files that the options `--eds` and `--eds-dir` name.
 
-    A file in a folder is chosen when a node sends its identity, and each choice is reported.
+    When a node sends its identity, the matching file in a folder of `--eds-dir` is chosen and
+    reported.
 
     Raises:
         Refused: a node, file or folder is missing or invalid.

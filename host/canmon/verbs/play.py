@@ -157,7 +157,7 @@ class Lateness:
     def percentile_us(self, percent: float) -> int:
         """Return a percentile of the delays in microseconds, or 0 if nothing was counted.
 
-        `percent` is 0 to 100. This percentage of the delays is not longer than the result.
+        The result is the delay that `percent` (0 to 100) of the delays do not exceed.
         """
         left = self.count * percent / 100
         for late_us, count in sorted(self._counts.items()):

@@ -211,7 +211,7 @@ class _Seen:
         self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects, rules=rules)
 
     def by_columns(self, log: BlockLog) -> bool:
-        """Process a log in blocks of columns. Return False if it must be read frame by frame."""
+        """Process a log in blocks of columns, or return False if it must be read frame by frame."""
         feed = column_survey.ColumnSurvey(self.decoder, self.survey)
 
         def take(block: Columns) -> None:

@@ -72,9 +72,10 @@ def check_node_ids(
 def check_cob_ids(
     notes: BusFileNotes, master: BusMaster | None, slaves: Mapping[str, BusSlave]
 ) -> None:
-    """Report CAN-IDs on which two nodes send, and CAN-IDs that are reserved for other services.
+    """Report CAN-IDs with which two nodes send, and CAN-IDs that are reserved for other services.
 
-    The RPDOs of slaves count as messages of the master. Two slaves may receive the same message.
+    The RPDOs of slaves count as messages that the master sends. Two slaves may receive the same
+    message.
     """
     senders: dict[int, tuple[str, FilePlace, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:
@@ -214,8 +215,8 @@ def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
     """Return a finding for each faulty EDS of the slaves.
 
-    It contains the number of errors that `canmon eds check` finds, and the names of those that
-    prevent dcfgen from reading the EDS.
+    The finding contains the number of errors that `canmon eds check` finds. It also names the
+    errors because of which dcfgen cannot read the EDS.
     """
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):

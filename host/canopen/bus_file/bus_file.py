@@ -203,7 +203,7 @@ class BusFile:
 
     @property
     def warnings(self) -> tuple[RuleFinding, ...]:
-        """Findings that only cause a warning of dcfgen, or a refusal of a node at boot-up."""
+        """Findings for which dcfgen only prints a warning, or a node refuses a write at boot-up."""
         return self._of(Severity.WARNING)
 
     def _of(self, severity: Severity) -> tuple[RuleFinding, ...]:
@@ -211,7 +211,7 @@ class BusFile:
 
 
 def is_bus_file(data: bytes) -> bool:
-    r"""Return whether a file looks like a bus.yml, valid or not. This works without PyYAML.
+    r"""Return whether a file looks like a bus.yml, even if it is invalid. PyYAML is not needed.
 
     Args:
         data: content of the file, or its first bytes.
@@ -226,8 +226,8 @@ def is_bus_file(data: bytes) -> bool:
 def check_of(data: bytes, path: Path) -> str:
     r"""Return a text that names the kind of a YAML file and the command that checks it.
 
-    The text is empty if the content is unknown. It appears in messages about a file that another
-    command cannot read.
+    Other commands use this text in their messages about a file that they cannot read. If the kind
+    of file is unknown, the text is empty.
 
     Args:
         data: content of the file, or its first bytes.

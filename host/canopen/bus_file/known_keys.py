@@ -59,9 +59,9 @@ class _Allowed(NamedTuple):
     said: str
 
     def value_of(self, item: Item) -> int | None:
-        """Return the number that a driver reads from a YAML value, or None if it is refused.
+        """Return the number that a driver reads from a YAML value, or None for a refused value.
 
-        The driver reads with yaml-cpp, which ignores quotes. A boolean gives 1 or 0.
+        The driver uses yaml-cpp, which ignores quotes. A boolean is read as 1 or 0.
         """
         if not self.numbers:
             return _FLAGS.get(item.text.lower())

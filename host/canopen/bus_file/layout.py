@@ -23,8 +23,8 @@ class Layout(NamedTuple):
         options: section `options`, or None if the file has none.
         master: section `master`, or None if the file has none.
         slaves: sections of the slaves by name, in the order of dcfgen.
-        hidden: file and line of each top-level key that begins with a dot, by key. It is empty for
-            a file in the layout of cogen, because dcfgen does not read this file directly.
+        hidden: file and line of each top-level key that begins with a dot, by key. There are none
+            for a file in the layout of cogen, because dcfgen does not read such a file directly.
         defaults: section whose keys cogen copies to all nodes, or None if the file has none.
     """
 

@@ -95,7 +95,7 @@ class BusFileSection:
         return key in self.fields
 
     def place_of(self, key: Key) -> FilePlace:
-        """Return the file and line of a key. For a missing key, return those of the section."""
+        """Return the file and line of a key. If the key is missing, return those of its section."""
         return self._item.keys.get(key, self.place)
 
     def note(self, rule: str, key: Key, text: str) -> None:

@@ -78,7 +78,7 @@ class PdoReader:
             first: index of the communication parameter of PDO 1.
 
         Returns:
-            The PDOs that enter the master's dictionary.
+            The PDOs that are added to the object dictionary of the master.
         """
         pdos = {
             index - first + 1: _of_sheet(self._sheet, index) for index in self._sheet.pdos(first)

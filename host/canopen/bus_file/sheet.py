@@ -59,7 +59,7 @@ class Sheet:
         return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
-        """Return the entries of an object by sub-index; empty if the EDS lacks the object."""
+        """Return the entries of an object by sub-index, or an empty result without the object."""
         return self._rows.get(index, {})
 
     def row(self, index: int, sub: int) -> EntryDescription | None:
@@ -75,9 +75,9 @@ class Sheet:
         return int.from_bytes(data, "little", signed=row.signed)
 
     def beside(self, index: int) -> str:
-        """Return the EDS file and line of an object, or a text that the EDS lacks the object.
+        """Return the EDS file and line of an object, as a text for error messages.
 
-        Error messages contain this text.
+        If the EDS lacks the object, the text states this instead.
         """
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
@@ -116,13 +116,13 @@ class Sheets:
     def find(self, node: BusFileSection) -> Sheet | None:
         """Find and read the EDS or DCF of a node.
 
-        If there is no such file, a finding is reported and the result is None. The file is searched
-        in this order:
+        If no file is found, a finding is reported and the result is None. The file is searched in
+        this order:
 
         - in the folder of the bus.yml, as in dcfgen
         - in `dcf_path`
-        - by the bare file name in the folder of the bus.yml and one folder up, because a `dcf_path`
-          may exist only in a container
+        - in the folder of the bus.yml and in its parent folder, by the file name without folders,
+        because the folder `dcf_path` may exist only in a container
         """
         name = node.text("dcf")
         if not name:
@@ -229,7 +229,7 @@ class Writes:
             sub: sub-index of the object.
             value: value that the bus.yml gives.
             place: file and line of the bus.yml that requires the write.
-            said: value as written in that line.
+            said: value as it is written in that line of the bus.yml.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)

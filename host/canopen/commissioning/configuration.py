@@ -64,11 +64,12 @@ def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
 
 
 def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
-    """Return a text about each PDO that stays disabled if the writing of a configuration stops now.
+    """Return a text about each PDO that stays disabled if no further configuration is written.
 
     Args:
-        done: writes that have been executed. One of them disabled the PDO.
-        left: writes that have not been executed. One of them would enable the PDO again.
+        done: SDO writes that have been executed, including those that disabled PDOs.
+        left: SDO writes that have not been executed, including those that would enable the PDOs
+            again.
     """
     was = {at: data for at, data in done if at[1] == _COB_ID and at[0] in PDOS}
     will = {at: data for at, data in left if at[1] == _COB_ID and at[0] in PDOS}
@@ -92,8 +93,8 @@ def writes(
     Args:
         values: wanted value of each object, by index and sub-index.
         number: function that reads an object of the node as an unsigned number.
-        writable: objects that the node lets the host write. Temporary writes, such as disabling a
-            PDO, are left out for other objects.
+        writable: objects that the host can write. Other objects are not written temporarily, for
+            example to disable a PDO.
 
     Raises:
         ValueError: a COB-ID or a number of mapped objects is invalid.

@@ -86,7 +86,7 @@ class LssMaster:
     def at_work(self) -> Iterator[None]:
         """Switch all slaves to the LSS state waiting, before and after the `with` block.
 
-        The slaves are also switched if the block raises an error.
+        After the block, the slaves are switched even if the block raises an error.
         """
         self.switch_all(LssMode.WAITING)
         try:
@@ -169,9 +169,9 @@ class LssMaster:
     def count(self) -> int:
         """Return how many slaves in the LSS state configuration answer a node-ID request.
 
-        This shows whether a fastscan has found several slaves with the same LSS address. If such
-        slaves answer at the same moment, their answers are one frame on the bus and count as one.
-        If no slave supports the request, the result is 0.
+        A result above 1 means that a fastscan has found several slaves with the same LSS address.
+        If such slaves answer at the same moment, their answers appear as one frame on the bus and
+        count as one. If no slave supports the request, the result is 0.
         """
         return len(self._answers_to(message(LssCommand.INQUIRE_NODE_ID)))
 

@@ -90,8 +90,8 @@ class Act:
 
     Attributes:
         words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
-        within_ms: time limit of the stimulus in milliseconds, or None for no limit. If it takes
-            longer, the check is inconclusive.
+        within_ms: time limit of the stimulus in milliseconds, or None for no limit. If the stimulus
+            takes longer, the check is inconclusive.
     """
 
     words: tuple[str, ...]
@@ -103,8 +103,8 @@ class Macro:
     """Step that runs a macro, an operation that needs many frames, such as an LSS fastscan.
 
     Attributes:
-        words: arguments of the macro. Once names are replaced, they also include addresses of
-            objects.
+        words: arguments of the macro. When a run has replaced the names, addresses of objects are
+            among the arguments.
     """
 
     name: str
@@ -116,8 +116,8 @@ class OfObject:
     """Base class of the steps that read or write one object of the node.
 
     Attributes:
-        at: object, as a name or as text such as `1017:00`. Once names are replaced, it is an index
-            and a sub-index.
+        at: object, as a name or as a text such as `1017:00`. When a run has replaced the names, the
+            attribute is an index and a sub-index.
     """
 
     at: str | Address
@@ -160,7 +160,7 @@ class ReadOther(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRead(OfObject):
-    """Step that reads an object. The node must refuse this with one of the SDO abort codes."""
+    """Step that reads an object. The node must refuse it with one of the given SDO abort codes."""
 
     codes: tuple[str, ...]
 
@@ -182,7 +182,7 @@ class Hold(OfObject):
         low: lowest allowed value, or None for the lowest value of the type.
         high: highest allowed value, or None for the highest value of the type.
         value: the only allowed value in hex, or None for any value.
-        codes: SDO abort codes with which the node may refuse to give the value.
+        codes: SDO abort codes with which the node may refuse the read request.
     """
 
     kind: str
@@ -196,7 +196,7 @@ class Hold(OfObject):
 class RefuseRewrite(OfObject):
     """Step that reads an object and writes its value back, with `grow` more bytes.
 
-    The node must refuse this value, because it is too long, with one of the given SDO abort codes.
+    This value is too long, so the node must refuse the value with one of the given SDO abort codes.
     """
 
     grow: int
@@ -209,7 +209,7 @@ Action = _OfFrames | _OfAnObject
 
 
 class Step(NamedTuple):
-    """One step of a conformance check: an action, and when and how it counts.
+    """One step of a conformance check, with its action and its effect on the verdict.
 
     Attributes:
         action: action of the step, such as sending a frame or waiting for one.
@@ -224,7 +224,7 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """How much a run may change the node under test. Each level includes the levels before it."""
+    """Level of a run: how much it may change the tested node. A level includes the earlier ones."""
 
     READ_ONLY = 0
     """SDO uploads and listening.
@@ -338,13 +338,12 @@ class ConformancePlan:
     def may_choose(self, group: str, place: str = "") -> bool:
         """Return whether the patterns of `--only` can match a check, before the check is built.
 
-        This saves reading the files of groups, and building checks of objects, that are not
-        selected.
+        The caller then skips the files of groups and the checks of objects that are not selected.
 
         Args:
             group: name of the group.
-            place: beginning of the check's id after the group, such as `1017.00` for the checks of
-                this object.
+            place: beginning of the check's id after the name of the group, such as `1017.00` for
+                the checks of the object 1017h:00.
         """
         begun = f"{group}-{place}".upper()
         for pattern in map(str.upper, self.only):

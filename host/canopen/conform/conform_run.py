@@ -109,10 +109,10 @@ class _StrayHeartbeat:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Listen again after the run for a heartbeat that 1017h does not set.
+        """Check after the run that the node still sends a heartbeat that 1017h does not enable.
 
-        The node sent this heartbeat before the run. If it is missing now, it is reported as not
-        restored, because the tester cannot switch it on again.
+        This applies to a node that sent such a heartbeat before the run. If the heartbeat is
+        missing now, it is reported as not restored, because the tester cannot switch it on again.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:
@@ -157,7 +157,7 @@ class ConformRun:
         node_id: node-ID of the node, 1..127.
         plan: options of the run, such as level and selected checks.
         device: device that the EDS describes, or None to find out the objects from the node.
-        claims: capabilities that only the EDS states, or None without an EDS.
+        claims: capabilities of the device that only the EDS states, or None without an EDS.
         source: name of the bus as the user entered it, for the report.
         on_result: function that is called with the result of each check.
     """

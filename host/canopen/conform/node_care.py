@@ -141,8 +141,7 @@ class KnownState:
         """Restore the objects that a reset has changed to the values with which each check begins.
 
         The first reset of a kind shows which objects it changes. After later resets of this kind,
-        only these objects and the objects written since then are read. Reading all objects each
-        time took half the processor time of a run.
+        the tester reads only these objects and the objects written since the last reset.
 
         Args:
             resets: kinds of the resets that happened, empty if the kind is unknown.
@@ -313,10 +312,10 @@ class NodeCare:
         exchange: bus with the node.
         client: SDO client that reads and writes the objects.
         node_id: node-ID of the node, 1..127.
-        level: level of the run. On READ_ONLY, nothing is written.
+        level: level of the run. With the level READ_ONLY, nothing is written.
 
     Attributes:
-        state: values of the node before the run, and in checks.
+        state: values of the node: those before the run, and those with which each check begins.
         errors: the bits of the error register that were set before the run and are still set.
         lost: whether the node no longer answers.
     """

@@ -73,9 +73,10 @@ class _Names(Protocol):
     def text(self, name: str, attribute: str, /) -> str:
         """Return the text that replaces `$name.attribute` in a check.
 
-        All values are in hex, in the byte order of the bus. The attributes of an object are `new`
-        and `other` for two allowed values, `old` for the value before the run, and `map` for its
-        mapping entry. An empty attribute stands for its multiplexer (index and sub-index).
+        All values are in hex, in the byte order of the bus. The attributes `new` and `other` of an
+        object are two allowed values. The attribute `old` is the value before the run, and `map` is
+        the mapping entry of the object. An empty attribute stands for the multiplexer of the object
+        (index and sub-index).
 
         Raises:
             Unbound: the node has no object or value for this name.
@@ -240,10 +241,10 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return the text of a step without its expected abort codes, as the head of a failure message.
+    """Return the text of a step with which its failure message begins.
 
-    The text is empty for a step about frames, because its failure message contains the expected
-    frames.
+    The text does not contain the expected abort codes. For a step about frames, the text is empty,
+    because the failure message contains the expected frames.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():

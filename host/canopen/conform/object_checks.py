@@ -142,8 +142,8 @@ class _Maker:
 
         Args:
             entry: entry with its data type, access and limits.
-            counts: whether the entry is the sub-index 0 of a record, which holds its highest
-                sub-index.
+            counts: whether the entry is the sub-index 0 of a record, whose value is the highest
+                sub-index of the record.
         """
         if entry.readable:
             constant = self._power_on(entry) if _is_constant(entry, counts) else None

@@ -105,7 +105,7 @@ class Permission:
             raise NotAllowed(f"{index:04X}h would be written with a valid value: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
-        """Check that the user agrees to an action. The user is asked once per question.
+        """Check that the user agrees to an action. The user gets each question only once.
 
         SYNC messages need no agreement if no other node is on the bus.
 

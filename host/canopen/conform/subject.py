@@ -332,7 +332,7 @@ class Subject:
     Attributes:
         binding: objects of the node by the names in checks.
         features: features that the node has.
-        names: texts and addresses that replace names in checks.
+        names: texts and object addresses by the names in checks, which they replace.
         about: properties that the node has reported, such as its device name, as texts by name.
         values: index and sub-index of each object that can be read and written.
         refused: mandatory objects that the node refuses to read.
@@ -346,10 +346,10 @@ class Subject:
     refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
-        """Return why a check cannot be applied because of a missing object, or None if it can.
+        """Return the reason why a missing object prevents a check, or None if no object is missing.
 
-        If the node lacks a mandatory object, one check fails for this reason, and the other checks
-        that need the object are not applied.
+        If the node lacks a mandatory object, one check fails for this reason. The other checks that
+        need the object are not applied.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
@@ -360,9 +360,10 @@ class Subject:
         return None
 
     def fixed(self, steps: Collection[check.Step]) -> str | None:
-        """Return why a write step cannot change its object, or None if all write steps can.
+        """Return the reason why a write step cannot be executed, or None if all write steps can.
 
-        CiA 301 allows some objects to be constant.
+        The reason is an object that the node does not let the host change. CiA 301 allows some
+        objects to be constant.
         """
         for step in steps:
             for at in _takes(step):

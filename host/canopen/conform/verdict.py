@@ -36,8 +36,8 @@ class FrameLine(NamedTuple):
 
     Attributes:
         at_us: bus time since the start of the run, in microseconds.
-        direction: whether the frame was sent to the node or came from the bus, or that the line is
-            a remark.
+        direction: direction of the frame, to the node or from the bus, or the information that the
+            line is a remark.
         text: frame in candump notation, or the text of the remark.
     """
 
@@ -57,8 +57,8 @@ class CheckOutcome:
         evidence: frames on the bus and remarks of the tester.
         start_us: bus time at the start of the attempt, in microseconds since the start of the run.
         end_us: bus time at the end of the attempt, in microseconds since the start of the run.
-        wanted: patterns of the frames that would have been correct, if the attempt failed because
-            of a frame.
+        wanted: patterns of the correct frames, if the attempt failed because of a wrong or missing
+            frame.
     """
 
     verdict: CheckVerdict
@@ -74,7 +74,7 @@ class Result:
     """Result of one check in a run.
 
     Attributes:
-        check: check that was judged.
+        check: check that was executed.
         outcome: attempt that decides the verdict.
         first: attempt before `outcome`, or None if the check was not repeated.
     """
@@ -121,7 +121,7 @@ class Report:
     absent: bool = False
 
     def with_verdict(self, *verdicts: CheckVerdict) -> list[Result]:
-        """Return the results whose verdict is one of these, in the order of the run."""
+        """Return the results that have one of the given verdicts, in the order of the run."""
         return [result for result in self.results if result.outcome.verdict in verdicts]
 
     def count(self, verdict: CheckVerdict) -> int:
@@ -132,8 +132,8 @@ class Report:
     def exit_status(self) -> int:
         """Exit status of `canmon conform` for this report (conform.md 5).
 
-        0: all checks pass, 1: a check failed, 4: a check is inconclusive or blocked, or the run
-        ended early, 5: no check was judged.
+        The status is 0 if all checks pass, 1 if a check failed, 4 if a check is inconclusive or
+        blocked or the run ended early, and 5 if no check has a verdict.
         """
         return self.exit_status_with(self.count(CheckVerdict.FAIL))
 

@@ -51,8 +51,8 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 def is_standard(at: Address, value: bytes) -> bool:
     """Return whether a value has the length that CiA 301 defines for its object.
 
-    Only COB-IDs and numbers of mapped objects have such a length. For other objects the result is
-    True.
+    Only COB-IDs and the numbers of mapped objects are compared with CiA 301. For other objects, the
+    result is True.
     """
     return len(value) == (_bytes_of(at) or len(value))
 

@@ -75,9 +75,10 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return a text with the letters that the first non-ASCII byte of a line stands for.
+        """Return the letters that the first non-ASCII byte of a line may represent, as a text.
 
-        An EDS does not name its encoding, so there is one letter for each possible encoding.
+        An EDS does not name its encoding, so the byte represents another letter in each possible
+        encoding.
         """
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
@@ -94,11 +95,11 @@ class Document:
         return self._subs.get(index, [])
 
     def entries(self, index: int) -> list[EntryDescription]:
-        """Return the entries of an object by sub-index; empty if the EDS lacks the object."""
+        """Return the entries of an object by sub-index, or an empty result without the object."""
         return self._entries.get(index, [])
 
     def section_of(self, row: EntryDescription) -> str:
-        """Return the section of an entry, which is that of its object if it has none of its own."""
+        """Return the section of an entry. Without its own section, return that of its object."""
         section = f"{row.index:04X}sub{row.sub:X}"
         return section if section in self.file.sections else f"{row.index:04X}"
 

@@ -41,8 +41,8 @@ def read_rules(path: Path) -> dict[str, _EdsRule]:
     """Read the descriptions of EDS rules from a text file. Return them by name, in file order.
 
     Args:
-        path: text file with a heading for each severity, such as `[error]`. Below it is one rule
-            per line: name, clause, consequence and fix, separated by ` | `.
+        path: text file with a heading for each severity, such as `[error]`. Each line below a
+            heading describes a rule by its name, clause, consequence and fix, separated by ` | `.
     """
     rules: dict[str, _EdsRule] = {}
     severity = Severity.ERROR
@@ -69,7 +69,8 @@ class Edit(NamedTuple):
 
     Attributes:
         line: number of the line, from 1. 0 stands for the place before the first line.
-        place: whether the new lines replace the line, follow it, or replace the whole file.
+        place: place of the new lines: instead of the line, after the line, or instead of the whole
+            file.
         lines: new lines, without line ends.
     """
 
@@ -88,7 +89,8 @@ class RuleFinding:
         line: line number, or 0 for the file as a whole.
         section: title of the section, empty outside of sections.
         text: invalid value, and the allowed values.
-        edits: edits that correct the violation, empty if this needs knowledge about the device.
+        edits: edits that correct the violation. There are none if a correction needs knowledge
+            about the device.
     """
 
     rule: _EdsRule

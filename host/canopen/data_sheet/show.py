@@ -199,11 +199,12 @@ _WHOLE: Final = ("object", "entry")
 
 
 def diff(one: Document, other: Document) -> list[_Change]:
-    """Return the differences between two EDS files, in what they state about the device.
+    """Return the differences between the devices that two EDS files describe.
 
-    Differences in the device, its identity and its bit rates come first, then those in objects, by
-    index. The order of sections, the notation of numbers, dates, file names and comments are
-    ignored, because they do not concern the device.
+    Differences in the device, its identity and its bit rates come first. Differences in objects
+    follow in the order of the index. The files may also differ in dates, file names, comments, the
+    order of sections and the notation of numbers. These differences are ignored, because they do
+    not concern the device.
     """
     return [*_device(one, other), *_objects(one, other)]
 

@@ -159,8 +159,8 @@ class CanopenMaster(Closing):
     def explain(self, name: str | int) -> str:
         """Return a text that explains the latest boot-up of a slave, and when the slave was lost.
 
-        There is one line for each request of the boot-up, with its answer, and one for the outcome.
-        Losses of the slave, and messages after a loss, are listed before or after the boot-up, in
+        The text has a line for each request of the boot-up with its answer, and a line for the
+        outcome. Losses of the slave and messages after a loss have further lines. All lines are in
         the order of time.
 
         Args:

@@ -25,8 +25,8 @@ class ProcessImage:
     """Values of the objects in the PDOs of one slave, as the master has received or written them.
 
     Values are 0 until they are received or written. When an object is written, the RPDO that
-    contains it is sent. A synchronous RPDO is sent with each n-th SYNC instead. As in Lely's
-    master, objects that have not been written are sent as 0.
+    contains the object is sent. A synchronous RPDO is sent with each n-th SYNC instead. If an RPDO
+    also contains objects that have not been written, they are sent as 0, as in Lely's master.
 
     The inhibit times, event timers and deadlines of the master are not emulated.
 

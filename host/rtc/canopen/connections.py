@@ -68,7 +68,7 @@ class PortConnections:
     def forget(self, first: str, second: str) -> bool:
         """Remove a connection from those that are still to be made.
 
-        Return False if it is not one of them.
+        Return False if the connection was not still to be made.
         """
         ends = {first, second}
         waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]
@@ -94,7 +94,7 @@ class PortConnections:
 def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
     """Return whether both components of a connection exist, so that it can be made.
 
-    Raise RtcRefused if a component exists, but not its port.
+    Raise RtcRefused if a component exists, but does not have the port.
     """
     names = {component.instance_name for component in manager.components}
     ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
@@ -111,8 +111,8 @@ def _entry(profile: ConnectorProfile) -> definition.RtConnection:
 class PdoLinks:
     """PDO links between nodes, by which a node directly receives a PDO that another node sends.
 
-    A link sets the CAN-ID of an RPDO of one node to that of a TPDO of the other node. It is made
-    when both nodes are ready.
+    A link sets the CAN-ID of an RPDO of one node to that of a TPDO of the other node. The link is
+    made when both nodes are ready.
 
     Args:
         nodes: nodes by node-ID.
@@ -158,8 +158,8 @@ class PdoLinks:
     def make(self, now_us: int, node_id: int) -> None:
         """Make the PDO links of a node that has just become ready.
 
-        A link still exists and is not made again if the node is only its source, and its target was
-        not reset.
+        If the node is only the source of a link, and the target was not reset, the link still
+        exists and is not made again.
         """
         for link in self.links:
             if link.target.node == node_id:
@@ -229,8 +229,8 @@ def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLa
 def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
     """Raise ServerRefused if the two PDOs of a link differ in length.
 
-    The lengths of the frames in bytes are compared. An RPDO with Booleans is filled up with dummy
-    bits, but a TPDO with the same Booleans is not, so the number of bits may differ.
+    The lengths of the frames are compared in bytes, because the numbers of bits may differ: an RPDO
+    with Booleans is filled up with dummy bits, and a TPDO with the same Booleans is not.
     """
     if source.size != target.size:
         raise definition.ServerRefused(

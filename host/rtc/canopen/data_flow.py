@@ -24,7 +24,7 @@ class PdoDataFlow:
     """Transfer of values between the bus and ports by PDO.
 
     Received TPDOs are written to OutPorts of the proxies, and values at InPorts are sent as RPDOs.
-    This happens while the proxy is Active. Data to the device also wait until the device is
+    Values are transferred while the proxy is Active. RPDOs are sent only when the device is also
     Operational.
 
     Args:
@@ -118,10 +118,10 @@ class PdoDataFlow:
 class SdoDataFlow:
     """Transfer of values between objects of devices and ports by SDO.
 
-    Objects are read for OutPorts of the proxies, and values at InPorts are written to objects. This
-    happens while the proxy is Active and its device Operational. Each port is transferred at most
-    once a period. One job transfers all waiting ports of a proxy, and the next job begins in the
-    period after the end of this job.
+    Objects are read for OutPorts of the proxies, and values at InPorts are written to objects.
+    Values are transferred while the proxy is Active and its device is Operational, at most once a
+    period for each port. One job transfers the values of all waiting ports of a proxy. The next job
+    begins in the period after the end of this job.
 
     Args:
         nodes: nodes by node-ID.
@@ -154,9 +154,9 @@ class SdoDataFlow:
     def put(self, name: str, value: Struct) -> ReturnCode | None:
         """Schedule a value for an InPort, without a connector.
 
-        It is written to the device in the next period.
+        The value is written to the device in the next period.
 
-        Return None if the port is unknown, otherwise the result.
+        Return the result, or None if the port is unknown.
         """
         for node in self._nodes.values():
             for sink in node.proxy.sdo_sinks if node.proxy else ():

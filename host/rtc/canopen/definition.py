@@ -60,8 +60,8 @@ class PdoName:
 
     Attributes:
         node: node-ID of the node.
-        pdo: name of the PDO within the node, `tpdo1`.. if the device sends it, or `rpdo1`.. if the
-            device receives it.
+        pdo: name of the PDO within the node, such as `tpdo1` if the device sends the PDO, or
+            `rpdo1` if the device receives it.
     """
 
     node: int
@@ -81,7 +81,7 @@ class PdoName:
 class BusEntry:
     """The CAN bus in a System Definition, as python-can selects it.
 
-    For a value of None, the command line decides.
+    If an attribute is None, the command line gives its value.
 
     Attributes:
         channel: channel, such as `can0`.
@@ -128,8 +128,8 @@ class PdoEntry:
 
     Attributes:
         mapping: objects that the PDO carries.
-        cob_id: COB-ID of the PDO. With bit 31, the PDO stays off. With bit 30, remote requests are
-            not allowed.
+        cob_id: COB-ID of the PDO. If bit 31 is set, the PDO stays off. If bit 30 is set, remote
+            requests are not allowed.
         type: transmission type.
         inhibit_100us: inhibit time in units of 100 us.
         event_ms: event timer in ms.
@@ -149,8 +149,8 @@ class SdoPortEntry:
     Attributes:
         index: index of the object. All elements of an array are one value.
         direction: `out` if the object is read for the port, `in` if it is written from the port.
-        type: name of the type in Table 4, or None for the default type of the object's data type in
-            the EDS.
+        type: name of the type of the port, or None for the default type for the object's data type
+            in the EDS.
     """
 
     index: int
@@ -302,12 +302,13 @@ class DeviceFile:
     """Data about a device type that the server reads from its EDS file.
 
     Attributes:
-        identity: values of the device type and identity objects (1000h, 1018h) that the file
-            contains.
-        defaults: power-on values in the file, as bytes. The node-ID is not added.
+        identity: values in the file for the objects 1000h (device type) and 1018h (identity).
+        defaults: power-on values in the file, as bytes. If a value depends on the node-ID, the
+            node-ID is not added here.
         data_types: data types by index and sub-index.
         pdos: indices of the PDO communication parameters of the device.
-        relative: keys of `defaults` to whose values a device adds its node-ID.
+        relative: keys in `defaults` of the values that depend on the node-ID. A device adds its
+            node-ID to these values.
         findings: errors in the file. Objects with errors are not used.
         mappable: objects that the PDOs of the device can carry.
     """

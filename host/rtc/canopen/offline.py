@@ -67,11 +67,11 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | 
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Check a System Definition without a bus.
 
-    Return the settings that nodes will refuse, as texts.
+    Return a text for each setting that a node will refuse.
 
-    The check assumes that the nodes match their EDS. The result also names PDOs that several nodes
-    send with one COB-ID, although no node refuses them. Two things are not checked: nodes whose EDS
-    lacks values, and components that do not exist.
+    The check assumes that the nodes match their EDS. There is also a text for each COB-ID with
+    which several nodes send a PDO, although no node refuses this. A node whose EDS lacks values is
+    not checked, and neither is a component that does not exist.
 
     Args:
         server: server that gets proxies without devices. The server cannot be used otherwise

@@ -190,8 +190,8 @@ _STATES: Final = {
 class NodeOperations:
     """Keeps a proxy and its CANopen device in the same state.
 
-    It executes the requests of the proxy on the bus, and moves the proxy when the NMT state of the
-    device changes.
+    The class executes the requests of the proxy on the bus, and moves the proxy to another state
+    when the NMT state of the device changes.
 
     Args:
         entry: settings of the node.
@@ -221,7 +221,7 @@ class NodeOperations:
         return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
-        """Send the proxy's recorded request to the device, unless it is already in that state.
+        """Send the proxy's request to the device, unless the device has already executed it.
 
         Args:
             lost: whether the heartbeat of the device is late.
@@ -309,7 +309,7 @@ class NodeOperations:
         Return False if no restart is left.
 
         Args:
-            to_start: whether the node will be activated anyway, without a restart.
+            to_start: whether the node will be activated anyway, even without this restart.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

@@ -76,7 +76,7 @@ _DUMMIES: Final = tuple(
 
 
 def mappable(file: definition.DeviceFile, index: int) -> tuple[definition.MappableObject, ...]:
-    """Return the objects that can be mapped into a PDO, with the dummy objects last.
+    """Return the objects that can be mapped into a PDO. The dummy objects are last.
 
     Args:
         file: content of the node's EDS.
@@ -117,7 +117,7 @@ def with_entry(
 def with_cob_id(pdo: PdoDescription, words: str) -> PdoDescription:
     """Return a copy of a PDO with the CAN-ID that the user typed, such as `290h`.
 
-    Its flags are kept.
+    The flags in the COB-ID are kept.
 
     Raise ValueError if the text is not a CAN-ID that a PDO may have.
     """

@@ -144,8 +144,8 @@ class PdoLayout:
         cob_id: CAN-ID of the PDO.
         fields: mapped objects, without dummies.
         bits: length of the PDO in bits.
-        unknown: mapped objects of types that ports do not support. If there are any, no ports are
-            made.
+        unknown: mapped objects of types that ports do not support. If the PDO has such objects, no
+            ports are made for it.
     """
 
     index: int
@@ -239,7 +239,7 @@ def pdo_decoder(layout: PdoLayout) -> _PdoDecoder:
     """Return the fastest function that decodes the data of a PDO to the values of its objects.
 
     If the objects are aligned like the fields of a C struct, the function uses the struct module.
-    It is then faster than `layout.decode`, nine times for four objects.
+    The function is then faster than `layout.decode`.
 
     >>> mapping = (MappedObject(0x6401, 1, 16), MappedObject(0x6401, 2, 16))
     >>> types = {(0x6401, 1): DataType.INTEGER16, (0x6401, 2): DataType.INTEGER16}

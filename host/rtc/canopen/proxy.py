@@ -109,7 +109,7 @@ class PdoSink:
         self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
 
     def preset(self, index: int, value: Value) -> None:
-        """Set the value of an object that frames contain until its port gets a first value."""
+        """Set the initial value of an object in the frames, used until its port gets a value."""
         for place, field in enumerate(self.layout.fields):
             if field.mapped.index == index:
                 self._latest[place] = value
@@ -199,7 +199,7 @@ class _SdoPortLayout:
         return tuple(elements)
 
     def decode(self, tm: Time, elements: Sequence[bytes]) -> Struct:
-        """Convert the bytes read from the object, one item per element, to a value of the port.
+        """Convert the bytes read from the object to a value of the port.
 
         Raise FieldError if the bytes are invalid.
         """
@@ -249,7 +249,7 @@ class SdoSink:
         self.pending: tuple[bytes, ...] | None = None
 
     def take(self) -> Struct | None:
-        """Remove all values from the InPort. Return the newest one, or None without a new value."""
+        """Remove all values from the InPort, and return the newest. Without values, return None."""
         value = None
         while self.port.is_new:
             value = self.port.read()

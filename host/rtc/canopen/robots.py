@@ -21,7 +21,8 @@ class Joystick(RtComponent):
     """Component that writes the velocity of a simulated joystick in each period.
 
     Attributes:
-        velocity: OutPort with the velocity, forward in m/s, and to the left in rad/s.
+        velocity: OutPort with the forward velocity in m/s, and the angular velocity to the left in
+            rad/s.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Joystick", "A stick as a velocity")
@@ -47,8 +48,8 @@ class Joystick(RtComponent):
     def typed(self, line: str) -> None:
         """Set the position of the stick by a line that the user typed, such as `50` or `50 -20`.
 
-        The numbers are the deflection to the front and, optionally, to the left, each in -100..100
-        %.
+        The first number is the deflection to the front. The second number, which is optional, is
+        the deflection to the left. Both are in per cent, -100..100.
         """
         try:
             percents = [float(word) for word in line.split()]
@@ -173,8 +174,8 @@ class Beego(WheeledBase):
     """Component for the robot beego, which has two wheels on CANopen drives of the type EPOS.
 
     The component sends motor velocities in rpm to the drives, and reads their positions in counts.
-    The maker's dimensions of the robot are not available. The dimensions in the configuration are
-    those of `examples/rigs/beego.toml`.
+    The maker does not publish the dimensions of the robot, so the configuration has those of
+    `examples/rigs/beego.toml`.
 
     Attributes:
         speeds: OutPorts `left_speed` and `right_speed`, for object 60FFh.
@@ -239,8 +240,8 @@ _FULL: Final = 32_767
 class FourX(WheeledBase):
     """Component for the robot FourX, whose four wheels are driven by CANopen motor units.
 
-    The robot steers like a tank. The units are in velocity mode. The pose is integrated from
-    measured speeds. If no new speed arrives, the last one is used.
+    The robot steers like a tank, and its motor units are in velocity mode. The component calculates
+    the pose from the measured speeds. If no new speed arrives, the component uses the last one.
 
     Attributes:
         references: OutPorts `fl_reference` and so on, for object 6411h:01.

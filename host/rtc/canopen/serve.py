@@ -110,7 +110,7 @@ def open_server(path: Path) -> RtcCanopenServer:
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
-    """Read the EDS files that a System Definition names, and return them by their path in it.
+    """Read the EDS files that a System Definition names. Return them by the path in the definition.
 
     Each file is read once.
 

@@ -223,7 +223,7 @@ class NodeServer(Protocol):
         """Schedule a tick of the node at `due_us`."""
 
     def booted(self, node: ServedNode, /) -> None:
-        """Create the proxy of a booted node, if it has none, with its links and connections."""
+        """Create the proxy of a booted node if it has none, and make its links and connections."""
 
     def gone(self, node: ServedNode, /) -> None:
         """Remove the proxy."""
@@ -302,8 +302,8 @@ class ServedNode:
     def restart(self, now_us: int) -> None:
         """Reset the node by NMT on request of a user, in any state.
 
-        The proxy is removed. The node is set up when it boots again. It is then activated if it was
-        Active, or was lost while it was Active.
+        The proxy is removed. When the node boots again, it is set up. If the node was Active before
+        the reset, or was lost while it was Active, it is then also activated.
         """
         operations = self.operations
         operations.now_us = now_us

@@ -85,12 +85,14 @@ class ServerObjects:
     |---|---|
     | 1000h | device type, 000001CCh |
     | 1001h | error register, 0 |
-    | 1005h, 1006h | COB-ID SYNC, with bit 30 if it sends it; communication cycle period, us |
+    | 1005h, 1006h | COB-ID SYNC, with bit 30 if the server sends SYNC; communication cycle period,
+    us |
     | 1016h | consumer heartbeat time of each node |
     | 1017h | producer heartbeat time |
     | 1018h | identity: vendor-ID 0, which is not assigned |
 
-    Not emulated: writing, segments and blocks. Every object has at most four bytes.
+    The server does not emulate SDO writing and the transfer in segments and blocks, because every
+    object has at most four bytes.
 
     Args:
         definition: settings of the server.
@@ -114,7 +116,7 @@ class ServerObjects:
         self._indices = frozenset(index for index, _ in self._table)
 
     def answer(self, data: bytes) -> bytes | None:
-        """Return the SDO response to a request, or None for an abort and for any other frame."""
+        """Return the SDO response to a request. For an abort or any other frame, return None."""
         try:
             request = sdo.parse_request(data)
         except WireError:
@@ -351,8 +353,8 @@ class RtcCanopenServer:
             value: value to send.
 
         Returns:
-            RTC_OK on success. BAD_PARAMETER if there is no such port or the value does not fit.
-            PRECONDITION_NOT_MET while the proxy is not Active, or if another device sends the PDO.
+            RTC_OK on success, BAD_PARAMETER if there is no such port or the value does not fit, or
+            PRECONDITION_NOT_MET while the proxy is not Active or if another device sends the PDO.
         """
         result = self._by_sdo.put(name, value)
         return self._data.put(name, value) if result is None else result

@@ -351,7 +351,7 @@ class ServerView:
         return self._transfer(node_id, pdo_edit.read_parameters(eds), {})
 
     def device_file(self, node_id: int) -> DeviceFile:
-        """Return the data that the server has read from a node's EDS.
+        """Return the data about the device type that the server has read from a node's EDS.
 
         Raise ServerRefused if there is no such node.
         """

@@ -58,9 +58,9 @@ class _WatchedPort:
 class Probes:
     """Probes that read the values of OutPorts for the user, and write the user's values to InPorts.
 
-    Each probe is a port without a component, with a connector of its own. A saved system therefore
-    does not contain these connectors. A connector that injects a value ends when the value was
-    read.
+    Each probe is a port that belongs to no component, and has a connector of its own. The file of a
+    saved system does not contain these connectors. A connector that injects a value ends as soon as
+    the value has been read.
 
     Args:
         manager: manager with the ports.
@@ -74,7 +74,7 @@ class Probes:
     def watch(self, name: str, since: int = 0) -> tuple[tuple[_NumberedValue, ...], int]:
         """Return the values that an OutPort has written since a previous call.
 
-        The first call starts this.
+        The values are recorded from the first call on.
 
         Args:
             name: full name or path of the port, such as `ConsoleIn0.out`.
@@ -100,7 +100,7 @@ class Probes:
 
         Args:
             name: full name or path of the port, such as `ConsoleOut0.in`.
-            given: value as parsed JSON; see `literal`.
+            given: value as parsed JSON, in the form that `read_literal` accepts.
 
         Raises:
             RtcRefused: there is no such port, the port is not an InPort, or the value does not fit.
@@ -198,7 +198,7 @@ class SystemControl(RequestDispatcher):
             what: format of the file, `toml` or `xml`.
 
         Raises:
-            ValueError: the format is another one.
+            ValueError: the format is neither `toml` nor `xml`.
         """
         match what:
             case "toml":

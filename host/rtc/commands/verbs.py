@@ -48,7 +48,8 @@ def component_lines(component: Any, *, long: bool) -> Iterator[str]:
 
     Args:
         component: description of the component, as the control socket returns it.
-        long: whether to show also the properties of connectors, and all configuration sets.
+        long: whether the lines also contain the properties of the connectors and all configuration
+            sets.
     """
     yield f"{component['name']}  {component['state'].capitalize()}"
     yield f"  {'Path':<14}{component['path']}"

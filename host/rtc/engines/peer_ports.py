@@ -262,7 +262,7 @@ class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> _P_co | None:
-        """Fetch the next value of the port in the other process, or return None if it has none.
+        """Fetch the next value of the port in the other process, or return None without one.
 
         The call may wait up to a time-out. Any exception means that there was no answer.
         """
@@ -326,10 +326,8 @@ class InPortPushConnector(_InPortConnector[T, P]):
     def put(self, payload: P) -> PortStatus:
         """Process a value that another process has pushed.
 
-        The InPort can read it from the next tick on.
-
-        Any thread may call this method. It does not wait for the manager's thread, because that
-        would take twice as long as the call of an ORB itself.
+        The InPort can read the value from the next tick on. Any thread may call this method, which
+        does not wait for the manager's thread.
 
         Returns:
             PORT_OK, or another status of the buffer. The result is INVALID_ARGS if the value cannot
@@ -510,10 +508,11 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         """Encode a value that the OutPort writes, and put it into the buffer of values to send.
 
         Returns:
-            INVALID_ARGS if the value cannot be encoded. Otherwise, the status of the buffer if that
-            is not PORT_OK. Otherwise, the status that the other process returned for the latest
-            value sent to it: PORT_OK, an error such as BUFFER_FULL, or CONNECTION_LOST if it did
-            not answer.
+            INVALID_ARGS if the value cannot be encoded. If the buffer does not accept the value,
+            the result is the status of the buffer. If the buffer accepts the value, the result is
+            the status that the other process returned for an earlier value, the latest that was
+            sent: PORT_OK, an error such as BUFFER_FULL, or CONNECTION_LOST if the process did not
+            answer.
         """
         try:
             payload = self._codec.encode(value)
@@ -573,8 +572,9 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         Any thread may call.
 
         Returns:
-            PORT_OK and the encoded value. If there is no value, BUFFER_EMPTY and None. After the
-            end of the connector, CONNECTION_LOST and None.
+            A status and the encoded value. The status is PORT_OK if there is a value, BUFFER_EMPTY
+            if the buffer is empty, and CONNECTION_LOST after the end of the connector. Without
+            PORT_OK, the value is None.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

@@ -129,7 +129,7 @@ class ReferenceSpin:
     alpha: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command that turns the cart to a heading, at `most` rad/s at most."""
+        """Return the command that turns the cart to a heading, with `most` rad/s or less."""
         q = wrap(heading - present)
         wanted = max(sqrt(2 * _ETA * self.alpha * abs(q)), _FLOOR)
         return Twist(0.0, copysign(min(most, wanted), q))
@@ -152,7 +152,7 @@ class TimeOptimalSpin:
     latency_s: float
 
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
-        """Return the command that turns the cart to a heading, at `most` rad/s at most."""
+        """Return the command that turns the cart to a heading, with `most` rad/s or less."""
         e = wrap(present + before.w * self.latency_s - heading)
         w = -copysign(min(most, sqrt(2 * self.alpha * abs(e))), e)
         if (e + self.latency_s * w) * e < 0:

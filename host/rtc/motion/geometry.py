@@ -20,7 +20,7 @@ class Pose(NamedTuple):
     def left(self, point: Pose) -> float:
         """Return the distance of a point to the left of the line through this pose.
 
-        It is negative at the right.
+        If the point is to the right of the line, the distance is negative.
         """
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 

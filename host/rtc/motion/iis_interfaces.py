@@ -107,7 +107,7 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
 
 class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
-    """Component that converts positions of a robot, of IIS phase 3 or of RH3, to IIS phase 2."""
+    """Component that converts robot positions from IIS phase 3 (or RH3) to IIS phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
@@ -159,9 +159,10 @@ _LOG: Final = log_of(__name__)
 class RunningInformation(RtComponent):
     """Component that calculates the velocity of a robot from its poses, and writes it each period.
 
-    The velocity is in the frame of the robot, and its time `tm` is that of the later pose. If the
-    latest pose is older than `timeout`, the velocity is 0. Use an execution context of 100 Hz or
-    more. A slower context is logged.
+    The velocity is given in the coordinates of the robot. It is calculated from the latest two
+    poses, and its time `tm` is the time of the later one. If the latest pose is older than
+    `timeout`, the velocity is 0. Use an execution context with a rate of at least 100 Hz.
+    Otherwise, a warning is logged.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")
@@ -215,10 +216,10 @@ class RunningInformation(RtComponent):
 class GoalInterface(RtComponent):
     """Component that accepts goals in the form of the IIS interface, for the planner of RH3.
 
-    A goal is the first pose of a list, and an empty list clears the goal. A new goal replaces the
-    old one. A cleared goal becomes an empty path, so that the cart stops on the spot, as IIS
-    recommends. A goal with an invalid number is ignored. Connect `position` with OmniTo2WD.goal and
-    `min_path` with Navigation.min_path.
+    The goal arrives as a list of poses, of which the component uses the first. A new goal replaces
+    the old one. An empty list clears the goal: the component then writes an empty path, so that the
+    cart stops on the spot, as IIS recommends. A goal with an invalid number is ignored. Connect
+    `position` with OmniTo2WD.goal and `min_path` with Navigation.min_path.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GoalInterface", "IIS goals for RH3")

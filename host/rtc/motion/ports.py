@@ -75,7 +75,7 @@ def to_pose(data: Pose2D) -> Pose | None:
 
 
 def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
-    """Return the latest pose at a port, or None without a new pose that is `plausible`."""
+    """Return the latest pose at a port, or None if there is no new, `plausible` pose."""
     latest = read_newest(port)
     return None if latest is None else to_pose(latest.data)
 

@@ -38,8 +38,8 @@ class Umbmark:
     def most_m(self) -> float:
         """The systematic error of the odometry in m (E_max,syst).
 
-        It is the mean error of the runs in one direction, as a distance from the origin, for the
-        direction with the larger error.
+        The errors of all runs in one direction are averaged, and the length of the mean is taken in
+        m. The result is the larger one of the lengths for the two directions.
         """
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 

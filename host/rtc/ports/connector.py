@@ -196,8 +196,8 @@ class _Publisher(Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `take` will return values.
 
-        The time is 0, so that it is due at once, if a new value waits with the subscription type
-        `new`. It is `NEVER` if no value waits.
+        If no value waits, the time is `NEVER`. If a new value waits with the subscription type
+        `new`, the time is 0, which means at once.
         """
         if not len(self._values):
             return NEVER
@@ -269,8 +269,8 @@ class Connector(ConnectorBase, Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `tick` will push values to the InPort.
 
-        The time is 0, so that it is due at once, if a new value waits with the subscription type
-        `new`. It is `NEVER` if no value waits.
+        If no value waits, the time is `NEVER`. If a new value waits with the subscription type
+        `new`, the time is 0, which means at once.
         """
         return self._publisher.due_us if self._publisher else NEVER
 

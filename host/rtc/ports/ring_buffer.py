@@ -76,7 +76,8 @@ class BufferOptions:
 class RingBuffer(Generic[T]):
     """Buffer of a connector for values that were written and not yet read, up to a maximum length.
 
-    Calls do not wait. Where OpenRTM would block, the call here returns as after a time-out.
+    Calls do not wait. If the buffer of OpenRTM would block, this buffer returns at once, with the
+    status of a time-out.
 
     Attributes:
         on_write: function that is called after a value was put into the buffer, or None.

@@ -301,8 +301,8 @@ class Scale(NamedTuple):
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
     """Return the physical values of many integers as texts, as `str` writes floats.
 
-    The texts are calculated with integers, which does not give the right text for every value. The
-    caller writes the other values one by one.
+    The texts are calculated with integers. For some values, this calculation does not give the
+    right text, so the caller converts these values one by one.
 
     Args:
         numbers: integers from the frames.

@@ -697,9 +697,9 @@ _PIECE: Final = 1 << 10
 class ColumnNodes:
     """Updates a node board from blocks of frames, with numpy, for `canmon nodes`.
 
-    After the last block, the board has the same state as after all frames one by one. An exception
-    is `NodeStatus.pdos`, which contains only the PDOs that affect this state. The command does not
-    show it.
+    After the last block, the board has the same state as if the frames had been processed one by
+    one. The only exception is `NodeStatus.pdos`, which contains only the PDOs that affect this
+    state, and which the command does not show.
 
     Args:
         decoder: decoder for single frames. Its attribute `standard` must be True.
@@ -747,8 +747,8 @@ class Exchanges(NamedTuple):
     Attributes:
         requests: rows of the requests.
         answers: rows of the answers, in the same order.
-        inner: whether a pair lies between two pairs of the same node, directly after one and before
-            another. Such a pair can be skipped without effect.
+        inner: whether the pair directly before and the pair directly after are of the same node. A
+            pair between two such pairs can be skipped without effect.
     """
 
     requests: Ints
@@ -868,8 +868,8 @@ def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Ma
     Args:
         bus: decoder for single frames of this bus, which contains what is known so far.
         frames: block of frames of one bus.
-        but: rows that need not be decoded, because their frames do not change the state of PDOs, or
-            None.
+        but: rows that the caller does not need, because their frames do not change the state of
+            PDOs. None stands for no such rows.
     """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

@@ -155,8 +155,8 @@ def teachers(frames: Columns, rows: Ints, memory: NodeMemory) -> Ints:
 def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
     """Return whether the decoder may learn something from the transferred value of an object.
 
-    Such values are those of communication objects, such as COB-IDs and PDO mappings, and that of
-    the statusword until 16 bits of it were seen.
+    The decoder learns from the values of communication objects, such as COB-IDs and PDO mappings.
+    It also learns from the statusword until a value with 16 bits was seen.
 
     Args:
         entry: index and sub-index of the object.
@@ -293,8 +293,8 @@ class ColumnSdo:
 
         Args:
             frames: frames of the bus.
-            speakers: SDO channel, True for frames of the client or False for frames of the server,
-                and rows of these frames, for each sender.
+            speakers: three values for each sender of SDO frames: the SDO channel, whether the
+                sender is the client, and the rows of its frames.
             places: index in `texts` of each frame.
             texts: texts of the block, to which the meanings are added.
         """

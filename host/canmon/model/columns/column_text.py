@@ -40,7 +40,7 @@ Intermediate results of these lines fit into the cache.
 
 
 def fits(columns: Columns) -> bool:
-    """Return whether the frames can be written all at once, which unusual bus names prevent."""
+    """Return whether all frames can be written at once. It needs printable ASCII bus names."""
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 
@@ -131,7 +131,8 @@ class ScreenText:
     """Writer for the lines of `canmon dump` that writes whole blocks of frames at once, with numpy.
 
     Args:
-        lines: writer for single frames with the same settings. Both may be used alternately.
+        lines: writer for single frames with the same settings. The two writers may be used
+            alternately.
     """
 
     def __init__(self, lines: frames.DumpLines) -> None:

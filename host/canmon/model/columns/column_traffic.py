@@ -236,11 +236,11 @@ class _ColumnGaps:
 
 
 def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
-    """Return for each time the number of its histogram bucket, as `bucket_of` does for one time.
+    """Return the histogram bucket numbers of several times, as `bucket_of` does for one time.
 
-    The number consists of the exponent and the first mantissa bits of the time as a floating-point
-    number. A time that is too long for an exact conversion is rounded down first, so that it does
-    not fall into the next bucket.
+    The time is converted to a floating-point number, whose exponent and first mantissa bits are the
+    number of the bucket. If a time is too long for an exact conversion, it is rounded down first,
+    so that it does not fall into the next bucket.
 
     Args:
         times_us: times in microseconds.

@@ -194,7 +194,7 @@ _NO_IDENT: Final = 0xFFFF_FFFF
 class Runs:
     """The rows of a block sorted by CAN-ID.
 
-    The rows of one CAN-ID keep their order. Together they are called a run.
+    The rows of one CAN-ID keep their order, and are called a run.
 
     Attributes:
         order: row indices in the sorted order.
@@ -203,7 +203,7 @@ class Runs:
         numbers: number that `Identifiers` gave to the CAN-ID of each run.
         fresh: whether a run contains the first frame of its CAN-ID in the whole log.
         gaps_us: time in microseconds since the previous frame of the CAN-ID, for each row in
-            `order`. It is 0 for the first frame, and if the time decreases.
+            `order`. The gap is 0 for the first frame of a CAN-ID, and if the time decreases.
     """
 
     order: Ints

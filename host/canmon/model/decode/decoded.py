@@ -180,12 +180,14 @@ class Signal(NamedTuple):
     """A named value in a frame, such as an object mapped to a PDO, or a signal of a DBC file.
 
     Attributes:
-        name: name of the object in lower case. The name of a record member follows after a dot. An
-            object without a known name is called by index and sub-index, such as `6041h:00`. For a
-            DBC file, it is the name of the signal in that file.
+        name: name of the signal. For an object, it is the name in lower case. If the object is a
+            member of a record, the name of the member follows after a dot. If the name is unknown,
+            index and sub-index are used instead, such as `6041h:00`. For a DBC file, the name is
+            that of the signal in the file.
         value: value of the signal.
         unit: unit of the value from the EDS or DBC file, empty if there is none.
-        text: value as text, such as the name of a state, or empty if the plain value is shown.
+        text: value as a text for display, such as the name of a state. It is empty if the value
+            itself is displayed.
     """
 
     name: str

@@ -195,7 +195,7 @@ class BusDecoder:
         return route if by_frame or self.layout(can_id) is not None else None
 
     def layout(self, can_id: int) -> PdoDecoder | None:
-        """Return the decoder of a CAN-ID if it is that of a PDO, but not of a multiplexed one."""
+        """Return the PDO decoder of a CAN-ID, or None without a PDO or for a multiplexed PDO."""
         layout = getattr(self._routed(can_id), "__self__", None)
         return layout if isinstance(layout, PdoDecoder) else None
 
@@ -207,8 +207,8 @@ class BusDecoder:
     def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
         """Return the SDO channel that a CAN-ID belongs to, or None if it has no SDO frames.
 
-        The result also contains whether the frames are sent by the client. It is valid until
-        `changes` grows.
+        With the channel, the result contains True if the client sends the frames, or False if the
+        server sends them. The result is valid until `changes` grows.
 
         Args:
             can_id: CAN-ID with 11 bits.
@@ -229,8 +229,8 @@ class BusDecoder:
     def answers_guarding(self, node: int) -> bool:
         """Return whether a node answers node guarding requests.
 
-        A node with a producer heartbeat time (1017h) does not, because it sends heartbeats instead
-        (CiA 301, error control).
+        If a node has a producer heartbeat time (1017h), the result is False, because the node then
+        sends heartbeats instead (CiA 301, error control).
 
         Args:
             node: node-ID of the node.
@@ -240,7 +240,7 @@ class BusDecoder:
     def guard(self, node: int, *, requested: bool) -> None:
         """Record whether the latest error control frame of a node was a guarding request.
 
-        This is needed to decode the next frame, which is then the answer of the node.
+        The next error control frame after a request is decoded as the answer of the node.
 
         Args:
             node: node-ID of the node.
@@ -316,7 +316,7 @@ class BusDecoder:
         return self.sdo_step(node, take(at_us, frame.data))
 
     def sdo_step(self, node: int, step: SdoStep) -> Decoded:
-        """Return the meaning of an SDO frame, and learn from the transfers that it ended.
+        """Return the meaning of an SDO frame, and learn from the transfers that the frame ended.
 
         Args:
             node: node-ID of the SDO server.
@@ -454,8 +454,8 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 def data_that_counts(route: Route) -> int:
     """Return a mask of the data bits that affect the meaning of the frames of a CAN-ID.
 
-    Frames that are equal in these bits have the same meaning, so that only one of them must be
-    decoded. If the mask is 0, the number of data bytes does not matter either.
+    If frames are equal in these bits, they have the same meaning, so that only one of them must be
+    decoded. If the mask is 0, the number of data bytes does not affect the meaning either.
 
     Args:
         route: function that decodes the frames of the CAN-ID.

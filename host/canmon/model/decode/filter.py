@@ -219,7 +219,7 @@ def _word_test(name: str, sign: str, value: str) -> Test:
 
 
 def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
-    """Return a function that returns whether a signal in a frame fulfils a comparison.
+    """Return a function that tests whether a signal in a frame fulfils a comparison.
 
     The default comparison is `!= 0`. A frame without the signal does not fulfil any comparison.
 
@@ -239,7 +239,7 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
 
 
 def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
-    """Return a function that returns a signal in a decoded frame, or one bit of it.
+    """Return a function that reads a signal, or one bit of a signal, from a decoded frame.
 
     The function returns None if the frame does not contain the signal.
 
@@ -310,10 +310,10 @@ def number(text: str) -> float | None:
 
 
 def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
-    """Return a function that returns whether a signal fulfils a comparison with a given value.
+    """Return a function that tests whether a signal fulfils a comparison with a given value.
 
-    If the given value is a number, it is compared with the value of the signal, otherwise with the
-    text of the signal.
+    A given number is compared with the value of the signal. Any other given value is compared with
+    the text of the signal.
 
     Args:
         sign: comparison operator from `COMPARISONS`. If the value is not a number, only the
@@ -345,7 +345,7 @@ def _can_id(record: AnyRecord) -> int | None:
 class MissingSignals:
     """Collector of the signals and words in filters that have not occurred in the traffic yet.
 
-    Those that never occur are reported to the user, because they may be misspelt.
+    If a signal or a word never occurs, it is reported to the user, because it may be misspelt.
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.

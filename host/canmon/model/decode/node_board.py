@@ -500,8 +500,8 @@ def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:
 def maker_text(row: NodeStatus) -> str:
     """Return the vendor and product code of a node as a short text.
 
-    The vendor is the name in an EDS file, or otherwise the number. A mark is added if the values
-    come only from the EDS file.
+    The text has the name of the vendor from an EDS file, or otherwise the number of the vendor. If
+    the values come only from the EDS file, a mark is added.
 
     Args:
         row: status of the node.
@@ -517,7 +517,7 @@ def maker_text(row: NodeStatus) -> str:
 def name_text(row: NodeStatus) -> str:
     """Return the device name of a node as text.
 
-    A mark is added if the name comes from an EDS file, because the node itself has not sent it.
+    If the node has not sent its name, the name comes from an EDS file, and a mark is added.
 
     Args:
         row: status of the node.
@@ -527,9 +527,10 @@ def name_text(row: NodeStatus) -> str:
 
 
 def told_identity(row: NodeStatus) -> str:
-    """Return the identity of a node as text: values that the node sent, then further EDS values.
+    """Return the identity of a node as text.
 
-    The serial number in an EDS file is left out, because it is not that of the real device.
+    The values that the node has sent come first, and further values from an EDS file follow. The
+    serial number in an EDS file is left out, because it is not the number of the real device.
 
     Args:
         row: status of the node.

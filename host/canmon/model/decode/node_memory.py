@@ -93,8 +93,8 @@ class ObjectText(NamedTuple):
 
         Args:
             data: bytes that were transferred.
-            sized: whether the transfer indicated the number of bytes. If it did, surplus bytes are
-                removed only if they are padding. Otherwise, all surplus bytes are removed.
+            sized: whether the transfer indicated the number of bytes. If True, surplus bytes are
+                removed only if they are padding. If False, all surplus bytes are removed.
         """
         kind = self.kind
         if kind is None or not 0 < kind.size < len(data):
@@ -336,8 +336,8 @@ Entry = tuple[int, int]
 class NodeMemory:
     """Everything that is known about the objects of one node, from SDO traffic and an EDS file.
 
-    A written value is valid until the node boots. Then the earlier value is valid again, unless the
-    node was commanded to store its parameters (1010h).
+    A value that was written to the node is valid until the node boots. After the boot-up, the
+    earlier value is valid again, unless the node was commanded to store its parameters (1010h).
 
     Args:
         eds: content of the node's EDS file, or None. Its power-on values are valid until the
@@ -447,8 +447,8 @@ class NodeMemory:
     def is_drive(self) -> bool:
         """Whether the node is a drive according to CiA 402.
 
-        The device type (1000h) determines it. If the device type is unknown, or stands for several
-        profiles, the node is a drive if it has a statusword (6041h:00) with 16 bits.
+        The device type (1000h) decides. If the device type is unknown or stands for several
+        profiles, the node counts as a drive if it has a statusword (6041h:00) with 16 bits.
         """
         device_type = self.number(*DEVICE_TYPE)
         # 1000h: profile in the low half; FFFFh above it stands for several of them (CiA
@@ -523,8 +523,8 @@ class Heartbeats:
     def period_us(self) -> int | None:
         """The period of the heartbeats in microseconds, or None if it is unknown.
 
-        The value of 1017h in SDO traffic takes precedence. Without it, the measured period is used,
-        or otherwise the value of 1017h in an EDS file.
+        If the value of 1017h was seen in SDO traffic, this value is used. Otherwise, the measured
+        period is used. If no period was measured, the value of 1017h in an EDS file is used.
         """
         if self.gaps and not self.by_sdo:
             return _median(self.gaps)
@@ -555,8 +555,8 @@ class Heartbeats:
 
         Args:
             at_us: time of the heartbeat in microseconds.
-            learns: whether to measure the period. It is False for a frame that may be the answer to
-                a guarding request.
+            learns: whether to measure the period. Use False for a frame that may be the answer to a
+                guarding request.
         """
         learns = learns and (self.from_boot or not self._booted)
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time

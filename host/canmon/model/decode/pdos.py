@@ -210,7 +210,7 @@ class PdoTable:
         self._can_ids: dict[NodePdo, int] = {}
 
     def layout(self, can_id: int) -> _Layout | None:
-        """Return the mapping of the PDO with a CAN-ID, or None if no PDO has it.
+        """Return the mapping of the PDO with a CAN-ID, or None if no PDO has this CAN-ID.
 
         If one node sends a PDO with this CAN-ID and others receive it, the mapping of the sender is
         returned.

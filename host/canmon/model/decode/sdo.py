@@ -416,7 +416,7 @@ class SdoStep(NamedTuple):
     """The effect of one SDO frame on the transfer that it belongs to.
 
     Attributes:
-        text: description of the frame, if no transfer ended with it.
+        text: description of the frame, used if no transfer ended with the frame.
         entry: index and sub-index of the transferred object, or None if unknown.
         ended: transfers that ended with the frame.
         asks: whether the client waits for an answer after the frame.
@@ -434,9 +434,9 @@ class SdoStep(NamedTuple):
 class SdoChannel:
     """Passive listener that combines the SDO frames of one client and one server to transfers.
 
-    If listening starts in the middle of a transfer, the part that was seen is returned, and marked
-    as partial. A listener does not know the time-out of the client. Therefore a transfer counts as
-    unanswered only if its client starts another one, or if the log ends.
+    If listening starts in the middle of a transfer, the received part of the transfer is returned,
+    and marked as partial. A listener does not know the time-out of the client. Therefore a transfer
+    counts as unanswered only when the client starts another transfer, or when the log ends.
 
     Args:
         node: node-ID of the SDO server.
@@ -511,7 +511,8 @@ class SdoChannel:
     def block_from(self) -> TransferDirection | None:
         """Return the direction of the block transfer whose segments are just being sent.
 
-        The result is None if no segments of a block are expected, or if the last one has arrived.
+        The result is None if no segments of a block are expected, or if the last segment has
+        arrived.
         """
         running = self._running
         if running is None or running.phase is not _TransferPhase.BLOCK:
@@ -524,7 +525,8 @@ class SdoChannel:
         Args:
             numbers: number of each segment.
             data: data of the segments, 7 bytes for each.
-            last: number of the last segment of the transfer; None if it has not arrived.
+            last: number of the last segment of the transfer, or None if that segment has not
+                arrived.
         """
         running = self._running
         assert running is not None, "a transfer runs"

@@ -125,7 +125,8 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
     """Return the meaning of an error control frame: boot-up, heartbeat or node guarding.
 
     Args:
-        node: node-ID of the sender, or for a request, of the guarded node.
+        node: node-ID of the node that sent the frame. For a guarding request, it is the node-ID of
+            the guarded node.
         frame: frame to decode.
         guarded: whether the frame is the answer to a guarding request.
     """

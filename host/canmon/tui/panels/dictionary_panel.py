@@ -43,8 +43,8 @@ _WATCH_US: Final = 1_000_000
 class DictionaryTask(Task):
     """Task that reads and writes objects of a node with its default SDO server (1200h).
 
-    The task communicates with one node at a time. The displayed values come only from the traffic,
-    so answers to other clients count, too.
+    The task communicates with one node at a time. The displayed values come from the traffic, so
+    answers of the node to other SDO clients are displayed too.
 
     Args:
         decoder: decoder that knows the objects of the nodes.
@@ -100,7 +100,7 @@ class DictionaryTask(Task):
         self._start(now_us, f"write {write_entry(entry)}", download(*entry, data))
 
     def watch(self, now_us: int, entry: Entry) -> None:
-        """Read an object of the chosen node each second, or stop this if it is read already."""
+        """Start to read an object of the chosen node each second, or stop these readings."""
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER
 

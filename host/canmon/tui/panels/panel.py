@@ -47,7 +47,7 @@ _CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
-    """A list of lines in a panel, of which the user chooses one.
+    """A list in a panel in which the user chooses a line.
 
     The chosen line is shown in reverse video.
 

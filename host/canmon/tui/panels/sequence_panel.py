@@ -61,8 +61,8 @@ _NAME: Final = re.compile(r"""\s*(?:name\s*=\s*["'](.+?)["']|#\s*(.+?))\s*""")
 def sequence_name(text: str, number: int) -> str:
     """Return the name of a sequence for display.
 
-    The name is the value of `name`, or a comment, in the first line of the text. Otherwise, it is
-    made from `number`.
+    The first line of the text gives the name, as a value of `name` or as a comment. If the first
+    line has no name, the name is made from `number`.
     """
     match = _NAME.fullmatch(text.partition("\n")[0])
     return (match[1] or match[2]) if match else f"sequence {number}"
@@ -109,8 +109,8 @@ class SequenceTask(Task):
         channel: name of the bus on which the task sends, empty for the first bus.
 
     Attributes:
-        events: events of the present execution, with the latest last. Their times count from the
-            beginning.
+        events: events of the present execution, oldest first. The times of the events count from
+            the beginning of the execution.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:

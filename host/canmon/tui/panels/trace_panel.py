@@ -359,7 +359,7 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_stamp(self) -> None:
-        """Switch to the next time format: since the first or previous frame, absolute, or date."""
+        """Switch to the next format of times, such as the time since the previous frame."""
         self.session.next_stamp()
         self.refresh_view()
 
@@ -424,9 +424,9 @@ class TracePanel(Panel):
             self.action_find()
 
     def action_bookmark(self) -> None:
-        """Set a bookmark at the frame of the cursor, or remove it.
+        """Set a bookmark at the frame under the cursor, or remove its bookmark.
 
-        Without a cursor, use the first visible frame.
+        Without a cursor, the command applies to the first visible frame.
         """
         passed, view = self._passed(), self.query_one(LineView)
         number = passed.first + view.top if self._cursor is None else self._cursor

@@ -94,7 +94,7 @@ class TransmitTask(Task):
         del self.list.rows[number], self.words[number]
 
     def enable(self, number: int, now_us: int, *, armed: bool) -> None:
-        """Start to send a row cyclically, or stop this if the row is sent already.
+        """Start to send a row cyclically. If the row is already sent cyclically, stop instead.
 
         Args:
             number: number of the row, from 0.
@@ -102,7 +102,7 @@ class TransmitTask(Task):
             armed: whether sending is armed.
 
         Raises:
-            ValueError: the list is not armed, or the row has no period.
+            ValueError: sending is not armed, or the row has no period.
         """
         row = self.list.rows[number]
         if row.enabled:

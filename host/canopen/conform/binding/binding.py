@@ -131,15 +131,16 @@ Bound = BoundObject | BoundPdo | BoundPlace
 class Binding:
     """Assignment of the names in conformance checks to objects and PDOs of the node under test.
 
-    A check whose names have no object is not applicable to the node.
+    If a name in a check has no object, the check is not applicable to the node.
 
     Attributes:
-        device: objects that the EDS describes, or without an EDS the objects that answered.
+        device: objects that the EDS describes. Without an EDS, these are the objects that could be
+            read.
         known: whether the objects come from an EDS.
         entries: entries of the dictionary by index and sub-index.
         reader: reader that has read the objects, and caches their values.
         bound: object or PDO of each name.
-        reasons: text for each name that has no object, which explains why.
+        reasons: text by name that explains why the name has no object.
     """
 
     device: EdsDevice
@@ -184,7 +185,7 @@ def bind(
     """
 
     def may_write(index: int) -> bool:
-        """Return whether an object may be written, with a value or to provoke a refusal."""
+        """Return whether a check may send a write request for an object to the node."""
         return index not in never and (index not in PROFILE_AREA or index in allow)
 
     reader = ObjectReader(upload)

@@ -117,9 +117,8 @@ class NodeDescription(NamedTuple):
     ) -> NodeDescription:
         """Make the description of an emulated node from its object table, without writing an EDS.
 
-        The result is the same as from an EDS of these objects. An EDS cannot express that an object
-        has no default value, so the description has the power-on value of every number, and no
-        value for an empty text.
+        The result is the same as that of an EDS with these objects. Therefore every number has its
+        power-on value as its default value, and an empty text has no default value.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]
@@ -147,7 +146,7 @@ class NodeFeatures:
 
     Attributes:
         words: names of the features that the node has, as checks write them.
-        reasons: text for each missing feature, which explains why it counts as missing.
+        reasons: text for each missing feature that explains why the feature counts as missing.
         findings: texts about contradictions between the EDS and the node.
     """
 

@@ -47,8 +47,8 @@ class ObjectReader:
     def read(self, entry: object_table.EntryDescription) -> bytes | None:
         """Read an object that the EDS describes. Return its bytes, or None if they are not usable.
 
-        They are not usable if the node refuses the request, or if the size contradicts the
-        description.
+        The result is None if the node refuses the request, or if the number of bytes contradicts
+        the description.
 
         Raises:
             SdoTimeout: the node no longer answers.
@@ -61,9 +61,10 @@ class ObjectReader:
         return answer if isinstance(answer, bytes) and not wrong else None
 
     def number(self, index: int, sub: int) -> int | None:
-        """Read an object as an unsigned number of at most 32 bits. Return None if it is not one.
+        """Read an object as an unsigned number of at most 32 bits.
 
-        The result is also None if the node refuses the request.
+        The result is None if the value is longer or is no number, or if the node refuses the
+        request.
 
         Raises:
             SdoTimeout: the node no longer answers.
@@ -72,7 +73,7 @@ class ObjectReader:
         return number_of(answer) if isinstance(answer, bytes) else None
 
     def has_nothing(self, index: int, sub: int) -> bool:
-        """Return whether the node refuses to read an index and sub-index, with any SDO abort code.
+        """Return whether the node refuses to read an index and sub-index, with any abort code.
 
         Raises:
             SdoTimeout: the node no longer answers.

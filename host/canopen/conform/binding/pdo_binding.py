@@ -150,7 +150,7 @@ def bind_pdos(
     """Find one PDO of the node for each PDO name in conformance checks.
 
     The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks send
-    no data to other RPDOs while these have their original mapping.
+    no data to any other RPDO before they have changed its mapping.
 
     Args:
         device: device that the EDS describes.
@@ -158,7 +158,8 @@ def bind_pdos(
         may_write: function that returns whether the run may write an object, by its index.
 
     Returns:
-        The PDO of each name, and for each name without a PDO a text that explains why.
+        Two mappings: the PDO of each name, and for the names without a PDO a text that explains
+        why.
     """
     bound: dict[str, BoundPdo] = {}
     reasons: dict[str, str] = {}

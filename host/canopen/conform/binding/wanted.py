@@ -41,16 +41,17 @@ class Use(Enum):
 
 
 class EntryFacts(NamedTuple):
-    """Properties of a dictionary entry that decide which names in checks it can replace.
+    """Properties of an object dictionary entry that decide which names in checks it can replace.
 
-    They are computed once per entry, because they are compared with the criteria of every name.
+    The properties are calculated once per entry, and then compared with the requirements of every
+    name.
 
     Attributes:
         entry: entry of the object dictionary.
         access: access rights of the entry as a bit mask.
         kind: number of the entry's data type (CiA 301).
-        free: whether all values in the entry's described range may be written. It is False for
-            communication objects for which CiA 301 has further rules.
+        free: whether every value between the limits of the entry may be written. This is False for
+            communication objects whose values CiA 301 limits further.
     """
 
     entry: EntryDescription
@@ -97,14 +98,12 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the entries that meet the criteria of this name, in the order of the argument.
+        """Return the dictionary entries that can replace this name in checks, in the given order.
 
-        If checks write the object, communication objects with further rules of CiA 301 are left
-        out.
-
-        The function is one loop without function calls, because calls took a tenth of the time of a
-        single check.
+        If checks write the object, the result contains no communication object whose values CiA 301
+        limits further.
         """
+        # One loop without function calls, which took a tenth of the time of a single check.
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE
         found = [
             entry

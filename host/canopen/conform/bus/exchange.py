@@ -64,8 +64,8 @@ _Line = tuple[int, Direction, CanFrame | str]
 class Evidence:
     """Recorded frames and remarks of one attempt at a check, which reports show for a failure.
 
-    Of many lines, only the first and the last ones are kept. Frames are formatted only when the
-    lines are read.
+    If there are many lines, only the first and the last lines are kept. Frames are formatted when
+    the lines are read.
     """
 
     def __init__(self) -> None:
@@ -178,7 +178,7 @@ class _Allowance:
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count a frame of the tester, or an answer of the node, as used bus load."""
+        """Count a frame of the tester, or an answer of the node, as bus load of the tester."""
         bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
         self.from_us = max(self.from_us, now_us - _WINDOW_US) + bits / self._bits_us
 
@@ -329,9 +329,9 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """How many nodes with the tested node-ID have answered: none, one or two.
+        """Number of nodes with the tested node-ID that have answered: none, one or two.
 
-        Two nodes share the node-ID if most SDO requests got two answers.
+        If most SDO requests got two answers, two nodes have this node-ID.
         """
         if self._is_silent:
             return Presence.NONE
@@ -341,9 +341,10 @@ class BusExchange:
         return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
-        """End the search for other nodes by their CAN-IDs, which the node under test may now use.
+        """Detect other nodes only by their heartbeat from now on.
 
-        From now on, another node is detected only by its heartbeat.
+        Before this call, frames with other CAN-IDs also show other nodes. From now on, the node
+        under test may send such frames.
         """
         self._others_by = _HEARTBEATS
 
@@ -405,10 +406,10 @@ class BusExchange:
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
-        """Wait for the next frame with a CAN-ID. It must match one of the patterns.
+        """Wait for the next frame with the CAN-ID of the patterns. It must match one of them.
 
         Args:
-            patterns: patterns of the allowed frames, all with the same CAN-ID.
+            patterns: patterns of the allowed frames. All patterns have the same CAN-ID.
             within_ms: time limit in milliseconds.
 
         Returns:
@@ -488,7 +489,7 @@ class BusExchange:
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Do not count the time since the last poll as a delay of the host: the user was asked."""
+        """Do not count the time since the last poll as a delay, because the host asked the user."""
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:
@@ -504,7 +505,7 @@ class BusExchange:
             self._listen(until_us)
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for the next frames. Return the time, and all frames that have arrived by then."""
+        """Wait for the next frames. Return a time, and all frames that have arrived by then."""
         if until_us <= self._known_us == self._link.now_us:
             return self._known_us, ()  # in virtual time; a poll costs as much as a request
         received = self._listen(until_us)

@@ -35,8 +35,8 @@ def can_id_of(pattern: str) -> str:
 def matches(pattern: str, text: str) -> bool:
     """Return whether a frame matches a pattern, both in candump notation.
 
-    In a pattern, a dot stands for any digit, `[..]` for one of the digits in it, and `*` for any
-    rest of the frame.
+    In a pattern, a dot stands for any digit, `[..]` stands for one of the digits in the brackets,
+    and `*` stands for any rest of the frame.
 
     >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
     (True, True)

@@ -151,9 +151,9 @@ def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def room(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Check that an object can hold a value of this size. The SDO download is started and aborted.
+    """Start and abort an SDO download, to find out whether an object can hold a value of this size.
 
-    A check needs this because an EDS does not give the maximum length of a string.
+    This is needed because an EDS does not state the maximum length of a string.
 
     Raises:
         NotAllowed: the node answers that the object is too short.
@@ -302,8 +302,9 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     Args:
         sdo: SDO frames of the node, used for access to the bus.
         can_id: CAN-ID of the node's error control messages.
-        words: expected states in hex, one per request. `=7F` expects the state 7Fh with a toggle
-            bit of 0. A word with # is a frame that is sent before the next request.
+        words: expected NMT states in hex, one per request. The word `=7F` expects the state 7Fh
+            with a toggle bit of 0. A word that contains # is a frame that is sent before the next
+            request.
     """
     toggle: int | None = None
     for word in words:

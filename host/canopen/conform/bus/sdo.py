@@ -91,7 +91,8 @@ class SdoClient:
     def abort(self) -> None:
         """Abort the SDO transfer that a check has left open.
 
-        The abort names the object of this transfer, because some CANopen stacks check it.
+        The abort message names the object of this transfer, because some CANopen stacks check the
+        object.
         """
         at = sdo_frame.index_sub(self._exchange.transfer)
         frame = Abort(*at, sdo_frame.AbortCode.GENERAL).encode()
@@ -204,8 +205,8 @@ class SdoFrames:
     def download(self, at: Address, data: bytes) -> None:
         """Send the first request of an SDO download.
 
-        A value of 1 to 4 bytes is in this request (expedited transfer). Otherwise the request
-        contains the number of bytes that follow in segments.
+        This request contains a value of 1 to 4 bytes itself (expedited transfer). For a longer
+        value, it contains the number of bytes that follow in segments.
         """
         mux = bytes.fromhex(multiplexer(at))
         if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:
@@ -216,7 +217,7 @@ class SdoFrames:
     def download_segments(self, data: bytes) -> None:
         """Send the segments of an SDO download that has been started.
 
-        Before each next segment, the node must have acknowledged the one before.
+        The node must acknowledge each segment before the next segment is sent.
         """
         for number, start in enumerate(range(0, len(data), sdo_frame.SEGMENT_BYTES)):
             part, toggle = data[start : start + sdo_frame.SEGMENT_BYTES], (number & 1) << 4

@@ -65,7 +65,7 @@ class Baseline:
         return report.exit_status_with(len(self.new(report)))
 
     def ends_with(self, report: verdict.Report) -> int:
-        """Return the exit status of `canmon conform`, in which known failures do not count.
+        """Return the exit status of `canmon conform`. Known failures do not count as failures.
 
         If the run ended early, the reason decides: Ctrl-C, or a failure of the bus.
         """

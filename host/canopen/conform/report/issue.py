@@ -34,8 +34,8 @@ def issue_text(
 ) -> str:
     """Return the failures of a run as a Markdown page, for an issue to the maintainer of a stack.
 
-    For each failure it contains the requirement, the answer of the node, the frames, and a script
-    that reproduces the failure.
+    For each failure, the page contains the requirement, the answer of the node, the frames, and a
+    script that reproduces the failure.
 
     Args:
         report: report of the run.

@@ -56,9 +56,9 @@ _HINTS: Final[Mapping[str, str]] = {
 
 
 def hint(result: Result) -> str:
-    """Return where the user should search for the cause of a failure; empty if there is no hint.
+    """Return a hint where the cause of a failure may be, or an empty text without a hint.
 
-    The text has no full stop.
+    The text has no full stop at its end.
     """
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:
@@ -122,9 +122,9 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
-    """Return the evidence of a check as lines of text: of both attempts, if the check was repeated.
+    """Return the evidence of all attempts at a check, as lines of text.
 
-    If the frames of both attempts are the same, they are shown once.
+    If a check was repeated and both attempts have the same frames, the frames are shown once.
     """
     if first is None:
         return show(outcome.evidence)
@@ -199,8 +199,8 @@ def unwell(report: Report) -> list[Result]:
 def causes(results: Iterable[Result]) -> list[list[Result]]:
     """Combine results that probably have the same cause, so that a report shows the cause once.
 
-    Object checks of the same kind that fail for the same reason are in one list. Each other result
-    is in a list of its own.
+    The result contains lists. Object checks of the same kind that fail for the same reason are in
+    one list. Each of the other results is alone in a list.
     """
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):

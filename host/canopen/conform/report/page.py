@@ -35,7 +35,7 @@ _MOST_OPEN: Final = 12
 def html_page(
     report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return a conformance report as one HTML page. The same report gives the same bytes.
+    """Return a conformance report as one HTML page. Equal reports give equal bytes.
 
     Args:
         report: report of the run.

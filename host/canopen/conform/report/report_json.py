@@ -18,7 +18,7 @@ _Object = dict[str, object]
 
 
 def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return a conformance report as JSON for programs. The same report gives the same bytes.
+    """Return a conformance report as JSON for programs. Equal reports give equal bytes.
 
     Args:
         report: report of the run.

@@ -33,8 +33,8 @@ def text_report(
         report: report of the run.
         baseline: failures that are known. Only their names are shown.
         show: function that formats the recorded frames as lines.
-        again: command line that runs a single check again, without the check's id at its end. If it
-            is empty, no such command is shown.
+        again: beginning of a command line that runs a single check again. The report appends the id
+            of the check. If the text is empty, no command is shown.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in overview.unwell(report) if not baseline.knows(result)]

@@ -109,7 +109,7 @@ def is_number(section: str, key: str) -> bool:
 
 
 def keys_of(section: str) -> dict[str, str] | None:
-    """Return the keywords that CiA 306 allows in a section, by their lower case.
+    """Return the keywords that CiA 306 allows in a section, by their names in lower case.
 
     The result is None if the section may have any keyword.
     """

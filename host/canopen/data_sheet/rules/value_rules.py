@@ -33,7 +33,7 @@ _OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 def numbers(document: Document) -> Iterator[RuleFinding]:
     """Find unusual notations of `$NODEID`, and numbers such as 010.
 
-    Some readers read 010 as octal, others as decimal.
+    Some programs read 010 as an octal number, and others as a decimal number.
     """
     for line in document.file.lines:
         if not _CANDIDATE.search(line.value):  # most lines have none
@@ -66,7 +66,7 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
-    """Return the data type of a value such as DefaultValue, or None if a line has none."""
+    """Return the data type of the value in a line, such as DefaultValue, or None without one."""
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = eds_value.object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():

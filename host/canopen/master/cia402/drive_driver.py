@@ -74,7 +74,7 @@ def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
 def period_us_of(slave: BusSlave) -> int:
     """Return the period in microseconds in which ros2_canopen reads and writes a drive.
 
-    The result is 0 if this is done with each SYNC.
+    The result is 0 if ros2_canopen reads and writes the drive with each SYNC.
     """
     if not _number(slave, "polling", 1):
         return 0
@@ -110,8 +110,8 @@ async def home(
         name: name of the joint, for messages.
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
-        caught_up: function that returns an operation. It waits for a statusword that the drive sent
-            after it received the latest controlword.
+        caught_up: function that returns an operation. The operation waits for a statusword that the
+            drive has sent after receiving the latest controlword.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
@@ -232,7 +232,8 @@ class DriveDriver:
     def set_target(self, target: float) -> None:
         """Set the target position, speed or torque of the drive, depending on its mode.
 
-        A position or speed is in units of the user, a torque in per mille of the rated torque.
+        A position or a speed is in the units of the user. A torque is in per mille of the rated
+        torque.
 
         Raises:
             DriveFailed: the drive is not in the state Operation enabled.
@@ -460,7 +461,7 @@ _AWAITED_US: Final = 3_000_000
 class DriveNode:
     """A CANopen node with one or more drive axes, which are read and written in each period.
 
-    This starts when the node has booted. A period is skipped while SDO transfers of the previous
+    The periods start when the node has booted. A period is skipped if SDO transfers of the previous
     period are still running.
 
     Args:

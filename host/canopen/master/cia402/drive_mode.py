@@ -113,7 +113,7 @@ class DriveMode:
         """Clear the set-point, as after a selection of the mode."""
 
     def set_target(self, value: float) -> None:
-        """Set the target in units of the device, which is written in the next period.
+        """Set the target, in units of the device, that is written to the drive in the next period.
 
         Raises:
             ValueError: this mode has no target.
@@ -124,7 +124,7 @@ class DriveMode:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the target to the drive. Return False if there is none: the drive then halts."""
+        """Write the target to the drive. Return False if there is none, so that the drive halts."""
         yield from ()
         return False
 

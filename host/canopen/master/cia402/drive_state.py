@@ -80,8 +80,8 @@ _ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
     """Return the state to which a drive must switch next on its way to a wanted state.
 
-    Only Operation enabled is reached through other states. For any other wanted state, the result
-    is this state.
+    The state Operation enabled is reached through the states before it. Any other wanted state is
+    the result itself.
     """
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 

@@ -40,7 +40,7 @@ _TEMPLATE: Final = string.Template(Path(__file__).with_name("header.txt").read_t
 def write_header(profile: RtcProfile) -> str:
     """Return the text of a C header for the firmware of a DeviceRTC.
 
-    The header has the ports, the callbacks, and every object with its default value.
+    The header contains the ports, the callbacks, and every object with its default value.
     """
     rows = list(object_table(profile))
     lower = snake_name(profile.type_name)

@@ -169,7 +169,7 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield one function that writes server events to the log file, or none without a file."""
+    """Yield a function that writes server events to the log file. Without a file, yield nothing."""
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
     elif log is not None:
@@ -195,7 +195,7 @@ _QUICK_US: Final = 2_000
 
 
 def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
-    """Run a server for a System Definition. Some options only check or draw the definition instead.
+    """Run a server for a System Definition, or only check or draw the definition.
 
     Args:
         file: path of the System Definition.

@@ -318,7 +318,7 @@ class PdoScreen(ModalScreen[None]):
     def action_link(self) -> None:
         """Remove the links of the PDO under the cursor.
 
-        If it has none, ask which PDO to link with it.
+        If the PDO has no links, ask the user for a PDO to link with it.
         """
         if (at := self._at()) is None:
             return

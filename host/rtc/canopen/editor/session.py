@@ -26,8 +26,8 @@ AddComponents = Callable[[RtcCanopenServer], None]
 class EditorSession:
     """Runs a CANopen server in a thread while a user interface shows it.
 
-    The session can change to another System Definition, for which it makes a new server. Hold
-    `lock` while you access the server.
+    The session can load another System Definition, and then makes a new server for it. Hold `lock`
+    while you access the server.
 
     Args:
         server: server to run.
@@ -77,7 +77,7 @@ class EditorSession:
     def load(self, path: Path) -> None:
         """Change to the System Definition in another file, for which a new server is made.
 
-        The old server ends and leaves its nodes as its definition requires.
+        The old server ends. It leaves its nodes in the NMT state that its definition requires.
 
         Raises:
             DefinitionError: the definition or an EDS cannot be used.

@@ -178,7 +178,7 @@ def joints(system: SystemView, port: PortView) -> list[PdoLink | RtConnection]:
 
 
 def connect(view: ServerView, first: Item, second: Item) -> None:
-    """Connect two ports with each other through the PC, in any order.
+    """Connect two ports through the PC. Either port may be given first.
 
     Raise ServerRefused or RtcRefused if the ports do not fit.
     """
@@ -189,7 +189,7 @@ def connect(view: ServerView, first: Item, second: Item) -> None:
 
 
 def link(view: ServerView, first: Item, second: Item) -> None:
-    """Link a TPDO of a node directly with an RPDO of another node, in any order.
+    """Link a TPDO of a node directly with an RPDO of another node. Either may be given first.
 
     Raise ServerRefused if the PDOs do not fit.
     """

@@ -199,8 +199,8 @@ class ConnectorEnd(ABC):
     def reference(self, ior: str, kind: Any) -> Reference:
         """Return the CORBA reference that an IOR contains, as a reference to a given interface.
 
-        The other process is not asked whether its object has this interface. If it has another one,
-        the first call ends with an error.
+        This method does not check that the object in the other process has this interface. If the
+        object has another interface, the first call ends with an error.
 
         Args:
             ior: text of the IOR (interoperable object reference).
@@ -289,7 +289,7 @@ class _OutPortClient:
         self._complaints = _Complaints(peer)
 
     def get(self) -> bytes | None:
-        """Return the next value of the port in the other process, or None if it has none.
+        """Return the next value of the port in the other process, or None if there is no value.
 
         Raise NoAnswerError if the other process does not answer.
         """
@@ -447,7 +447,8 @@ class ServiceEnd(ConnectorEnd):
     def join(self, values: dict[str, str]) -> ConnectorBase:
         """Connect the local port with a port that represents the port in the other process.
 
-        That port provides the services of the other process, and passes each call on to it.
+        The representing port provides the services of the other process, and passes each call on to
+        that process.
         """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:

@@ -106,10 +106,10 @@ class AttachedContexts:
     """CORBA operations of a component on its execution contexts, local and foreign ones.
 
     Another process attaches its own execution context to the component, and gets a handle. It then
-    calls `on_activated`, `on_execute` and so on with that handle. The callback gets the foreign
-    context as its argument, with the time of the manager. The other process manages the rate and
-    the states. If such a call has the handle of a local context, the result is
-    PRECONDITION_NOT_MET.
+    calls `on_activated`, `on_execute` and so on with that handle. The callback of the component
+    gets an object for the foreign context as its argument, whose time is the time of the manager.
+    The other process manages the rate and the states. If the other process calls with the handle of
+    a local context, the result is PRECONDITION_NOT_MET.
 
     Args:
         component: component that owns the contexts.
@@ -291,9 +291,9 @@ INTERFACE = "RTC.ExecutionContextService"
 class ExecutionContextServant:
     """CORBA object by which other processes control an execution context and its components.
 
-    Its methods are the operations of the IDL. Activating, deactivating and resetting wait for the
-    new state up to 1 s, as in OpenRTM. Components of other processes cannot join the context. Such
-    requests return UNSUPPORTED.
+    Its methods are the operations of the IDL. The operations that activate, deactivate or reset a
+    component wait up to 1 s for the new state, as in OpenRTM. Components of other processes cannot
+    join the context. Such requests return UNSUPPORTED.
 
     Args:
         context: execution context to serve.

@@ -87,11 +87,12 @@ class Orb:
 
         Args:
             skeleton: skeleton class of the object's interface, from a `..__POA` module.
-            answers: objects whose methods execute the operations, named as in the IDL. The first
-                object that has the method is used, and a missing operation is NO_IMPLEMENT. The
-                methods are called in threads of the ORB. Exceptions become answers: TimeoutError is
-                TIMEOUT, RtcRefused is BAD_PARAM or similar, a CORBA exception is returned as it is,
-                and any other is INTERNAL, with a line in the log.
+            answers: objects whose methods, named as in the IDL, execute the operations. The first
+                object that has the method is used. The methods are called in threads of the ORB.
+                If no object has the method, the caller gets NO_IMPLEMENT. If the method raises an
+                exception, the caller gets a CORBA exception: TIMEOUT instead of TimeoutError,
+                BAD_PARAM or a similar one instead of RtcRefused, an unchanged CORBA exception, or
+                INTERNAL instead of any other. The last one is also logged.
 
         Returns:
             The reference of the object. Calls through this reference within this process use no
@@ -173,8 +174,7 @@ def nvlist(values: Mapping[str, str]) -> list[Any]:
     """Return properties as an NVList, the list of names and values that CORBA operations use.
 
     Characters that a CORBA string cannot contain are replaced by U+FFFD, and the text is logged.
-    Otherwise, the ORB would refuse the whole answer after the servant has returned, where the
-    reason cannot be logged.
+    Without the replacement, the ORB would refuse the whole answer.
     """
     name_value = stubs().sdo.NameValue
     return [

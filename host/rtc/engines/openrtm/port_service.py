@@ -87,7 +87,7 @@ class _PeerConnections:
     ) -> _PeerConnection | None:
         """Begin a new connector: check it, and serve the object that the other process will call.
 
-        `keep` completes the connector later, or `drop` removes it again.
+        Later, call `keep` to complete the connector, or `drop` to remove it.
 
         Args:
             profile: profile of the connector.
@@ -154,13 +154,13 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connection with an ID. Its peer is then not notified of the end.
+        """Return the connection with an ID, before this connection is ended by the peer or a tool.
 
-        This is called when the peer or a tool requests the end of the connector.
+        The connection is marked, so that the peer is not notified of an end that the peer knows.
 
         Returns:
-            The connection, or None, and whether the ID is known. The ID is known if the connector
-            exists, or has just ended.
+            Two values: the connection, or None if there is none, and whether the ID is known. An ID
+            is known if its connector exists or has just ended.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -278,10 +278,10 @@ class _PortAnswers:
         return stubs().rtc.ConnectorProfile("", "", [], [])
 
     def connect(self, profile: _Profile) -> tuple[Any, _Profile]:
-        """Connect the ports in a connector profile. Return the result and the profile.
+        """Connect the ports in a connector profile. Return the result and the completed profile.
 
-        A missing ID and missing byte orders are filled in. The first port of the list then
-        connects.
+        A missing ID and missing byte orders are added to the profile. Then the first port of the
+        profile is asked to connect itself with the next port.
         """
         profile.connector_id = profile.connector_id or str(uuid.uuid4())
         profile.properties = connector_ends.completed(profile.properties)

@@ -18,8 +18,8 @@ INTERFACE: Final = "OpenRTM.DataFlowComponent"
 class RtObjectServant:
     """CORBA object by which other processes use a component: its ports, states and configuration.
 
-    Its methods are the operations of the IDL. Not emulated: organizations and composite components,
-    whose lists are empty, and services that other processes add.
+    Its methods are the operations of the IDL. Organizations and composite components are not
+    emulated, so their lists are empty. Other processes cannot add services.
 
     Args:
         component: component to serve.

@@ -45,7 +45,7 @@ class Stubs:
         rtc: IDL module `RTC`.
         openrtm: IDL module `OpenRTM`, with the component and data ports.
         rtm: IDL module `RTM`, with the manager.
-        services: interface `RefHard`, which is in no IDL module.
+        services: interface `RefHard`, which does not belong to an IDL module.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:

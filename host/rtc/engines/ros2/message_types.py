@@ -27,11 +27,11 @@ _ASTRAY_NS: Final = 10_000_000_000
 class Stamps:
     """Converts times of a system to time stamps of ROS messages, and back.
 
-    The times count from the start of the system, the stamps from 1970.
+    The times of the system count from its start, and the time stamps of ROS count from 1970.
 
-    Values with equal times get equal stamps, for example a pose and its transform. A value whose
-    time differs by more than 1 s from the time of the system gets the current time. If a system is
-    late, its values have the times at which they were due.
+    Values with equal times get equal stamps, for example a pose and its transform. If the time of a
+    value differs by more than 1 s from the time of the system, the value gets the current time. If
+    a system runs late, its values keep the times at which they were due.
 
     Args:
         now_us: function that returns the time of the system in us.

@@ -59,7 +59,7 @@ def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
 def pose_in(data_type: Any, entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
     """Return a function that converts a PoseStamped message to a pose in the plane.
 
-    The tilt is dropped.
+    The orientation of the message is reduced to a heading, so that a tilt is lost.
     """
 
     def convert(message: Any) -> Any:

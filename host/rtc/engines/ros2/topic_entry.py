@@ -68,7 +68,7 @@ class TopicTable:
         entries: entries with a port and a topic each. None means that each port with a matching
             message type has a topic of the same name as the port.
         diagnostics: topic for the states of the components, empty for none.
-        period_us: interval in us at which these states are published.
+        period_us: interval in us at which the states of the components are published.
     """
 
     entries: tuple[TopicEntry, ...] | None = None

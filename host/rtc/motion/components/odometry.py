@@ -19,9 +19,9 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 class Odometry(RtComponent):
     """Component that estimates the pose of a cart (middle of the drive axle) from wheel angles.
 
-    The motion is integrated on exact arcs. The port LocalizedPosition exists and is unused, as in
-    the specification. A message is ignored if its angles are not numbers, or if it has too few
-    angles for the configured wheel IDs.
+    The motion is integrated on exact arcs. The component has a port LocalizedPosition that it does
+    not use, as in the RH3 specification. A message is ignored if an angle is not a number, or if
+    the message has too few angles for the configured wheel IDs.
 
     Attributes:
         pose: estimated pose of the cart.

@@ -122,7 +122,7 @@ class PositionInput(RtComponent):
             raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
 
     def end(self) -> None:
-        """Move to Error once all commands have finished, as the original does at its end."""
+        """Make the component move to Error once all commands have finished."""
         self._ending = True
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:

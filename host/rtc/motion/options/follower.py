@@ -15,12 +15,14 @@ class Follower(RtComponent):
     """Component that makes a robot follow another robot (the leader) at a distance.
 
     The position of the leader arrives at the port `leader`. Both positions are in one map frame. If
-    the leader is nearer than `gap`, the robot stands. The robot never goes back. A base on two
-    wheels turns towards the leader and drives. With `sideways`, the robot drives straight to its
-    wanted position and turns to the heading of the leader. If either position is missing for
-    `pose_timeout`, the robot stands. The connector at `leader` decides which robot leads.
+    the leader is nearer than `gap`, the robot stands. The robot never goes back. By default, the
+    robot turns towards the leader and drives, as a base on two wheels can. With the parameter
+    `sideways`, the robot drives straight to its wanted position and turns to the heading of the
+    leader. If either position is missing for `pose_timeout`, the robot stands. The connector at
+    `leader` decides which robot leads.
 
-    The report gives no control law. This law, its gains and its limits are additions.
+    The report that describes this component gives no control law, so the law, its gains and its
+    limits are additions of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Follower", "Follows another robot")

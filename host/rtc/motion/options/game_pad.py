@@ -88,8 +88,8 @@ class GamePad(DeviceComponent[_GamePadDevice]):
     """Component that writes the velocity that the user requests by a game pad.
 
     It writes the velocity in each period while a stick is deflected, and 0 once after the release
-    of the stick. The specification has only the name of the component. Ports and parameters are
-    additions.
+    of the stick. The RH3 specification gives only the name of this component, so its ports and
+    parameters are additions of Tickrig.
 
     Args:
         instance_name: name of the component.

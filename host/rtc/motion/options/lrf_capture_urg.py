@@ -16,8 +16,8 @@ from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 class LrfCaptureUrg(DeviceComponent[UrgClient]):
     """Component that runs a URG laser scanner while Active, and writes each scan to a port.
 
-    A range of 0 means that no distance was measured. The specification has only the name of the
-    component (LRFCapture_URG). Ports and parameters are additions.
+    A range of 0 means that no distance was measured. The RH3 specification gives only the name of
+    this component (LRFCapture_URG), so its ports and parameters are additions of Tickrig.
 
     Args:
         instance_name: name of the component.

@@ -37,8 +37,9 @@ _LOG: Final = log_of(__name__)
 class UrgToObstacles(RtComponent):
     """Component that converts laser scans to obstacle positions in the coordinates of a robot.
 
-    The x axis points ahead from the axle, and the y axis points to the left. The specification has
-    only the name of the component (Urg_to_Obstacles). Ports and parameters are additions.
+    The x axis points ahead from the axle, and the y axis points to the left. The RH3 specification
+    gives only the name of this component (Urg_to_Obstacles), so its ports and parameters are
+    additions of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Urg_to_Obstacles", "Points out of range data")
@@ -76,7 +77,8 @@ class ObstacleMonitor(RtComponent):
 
     It considers obstacles within `half_width` of the middle line. The port `distance` has the
     distance from the front of the robot, or the value of the parameter `range` if the lane is free.
-    The specification has only the name of the component. Ports and parameters are additions.
+    The RH3 specification gives only the name of this component, so its ports and parameters are
+    additions of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstacleMonitor", "Distance to what is in the way")
@@ -145,9 +147,9 @@ class ObstaclesAvoidance(RtComponent):
     The component stops the cart, but does not plan a way around. Forward motion ends when an
     obstacle is nearer than `stop_distance`, and continues when it is farther than `go_distance`.
     The speed changes with the acceleration `max_acc_v`. Commands to turn on the spot and to go back
-    are not affected. Without a velocity for `timeout`, the component writes nothing, so that the
-    base's own watchdog acts. The specification has only the name of the component. Ports and
-    parameters are additions.
+    are not affected. If no velocity has arrived for the time `timeout`, the component writes
+    nothing, so that the watchdog of the base stops the cart. The RH3 specification gives only the
+    name of this component, so its ports and parameters are additions of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstaclesAvoidance", "Stop and go")
@@ -185,10 +187,13 @@ class ObstaclesAvoidance(RtComponent):
 class CollisionDetection(RtComponent):
     """Component that stops the base of a cart while an obstacle is nearer than `stop_distance`.
 
-    It calls Stop of the base, and Go when the lane is free again. Without a distance for `timeout`,
-    it calls Stop, because there may be an obstacle. When it is deactivated after Stop, it calls Go.
-    Connect `BumpRefHard` with RefHardRh3.BumpRefHard. The specification has only the name of the
-    component. Ports and parameters are additions.
+    The component calls the operation Stop of the base, and later the operation Go when the lane is
+    free again. If no distance has arrived for the time `timeout`, the component also calls Stop,
+    because there may be an obstacle. If the component is deactivated after Stop, it calls Go.
+
+    Connect the port `BumpRefHard` with the port RefHardRh3.BumpRefHard of the base. The RH3
+    specification gives only the name of this component, so its ports and parameters are additions
+    of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("CollisionDetection", "Stops the base at once")
@@ -237,8 +242,9 @@ _LATEST: Final = {"dataport.buffer.length": "8"}
 class CollisionGuard:
     """Adds components to a cart's motion chain that stop the cart before obstacles.
 
-    The components are between the range finder and the base. They run in the execution context of
-    the chain. PathFollower is connected with ObstaclesAvoidance instead of RefHardRh3.
+    The new components pass the data of the range finder on to the base, and run in the execution
+    context of the chain. The velocities of PathFollower then go to ObstaclesAvoidance first, and
+    from there to RefHardRh3.
 
     Args:
         manager: manager that runs the chain.

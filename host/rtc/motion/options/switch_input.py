@@ -17,9 +17,10 @@ class SwitchInput(RtComponent):
     """Component that selects between the velocities of a joystick and of a planner.
 
     The joystick has priority. When the joystick is released, the cart stands for the time `hold`,
-    and then follows the planner again. A deflected joystick without a message for `stale` counts as
-    released. A velocity with an invalid number counts as 0. The specification has only the name of
-    the component (SwitchInputRTC). Ports and parameters are additions.
+    and then follows the planner again. If a deflected joystick sends no message for the time
+    `stale`, the joystick counts as released. A velocity with an invalid number counts as 0. The RH3
+    specification gives only the name of this component (SwitchInputRTC), so its ports and
+    parameters are additions of Tickrig.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
