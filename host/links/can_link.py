@@ -205,8 +205,9 @@ def _enlarge_queue(sock: socket.socket) -> None:
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
     """Set up a python-can bus: enlarge its receive queue, and filter out foreign multicast groups.
 
-    A socket of `udp_multicast` would otherwise receive, on Linux, the data of every group that a
-    program on this machine has joined on the same port (ip(7), IP_MULTICAST_ALL).
+    On Linux, a socket of `udp_multicast` also receives the data of every other group that a program
+    on this machine has joined on the same port (ip(7), IP_MULTICAST_ALL). This function switches
+    that off.
 
     The driver of socketcand logs each exception that it raises, with a traceback. These log
     messages are dropped, because the reader of the bus reports the exceptions.

@@ -136,9 +136,9 @@ _T = TypeVar("_T")
 class WaitingQueue(Generic[_T]):
     """Queue from which one thread reads and to which any threads write, safe against signals.
 
-    A signal during a call does not block the queue, unlike the queues of Python:
-    `queue.SimpleQueue` (CPython 3.11) may then wait longer than its timeout, and `queue.Queue` may
-    keep a lock acquired.
+    A signal cannot block this queue. It can block the queues of Python: after a signal,
+    `queue.SimpleQueue` (CPython 3.11) may wait without end although it has a timeout, and
+    `queue.Queue` may keep a lock acquired.
     """
 
     def __init__(self) -> None:

@@ -463,8 +463,9 @@ class Consent:
         """Ask the user a yes-or-no question. Return True for yes.
 
         With the option `--yes`, the answer is yes without a question. Without a terminal, the
-        answer is no. If the node is emulated in virtual time, the answer is yes. The only exception
-        are LSS commands to all nodes, to which other nodes on the bus would also answer.
+        answer is no. If the node is emulated in virtual time, the answer is yes. If other nodes are
+        on the bus, LSS commands to all nodes are an exception, because these nodes would also
+        answer.
         """
         if self._yes:
             return True

@@ -122,7 +122,7 @@ class Sheets:
         - in the folder of the bus.yml, as in dcfgen
         - in `dcf_path`
         - in the folder of the bus.yml and in its parent folder, by the file name without folders,
-        because the folder `dcf_path` may exist only in a container
+          because the folder `dcf_path` may exist only in a container
         """
         name = node.text("dcf")
         if not name:

@@ -332,7 +332,7 @@ class Subject:
     Attributes:
         binding: objects of the node by the names in checks.
         features: features that the node has.
-        names: texts and object addresses by the names in checks, which they replace.
+        names: texts and object addresses that replace the names in checks, by name.
         about: properties that the node has reported, such as its device name, as texts by name.
         values: index and sub-index of each object that can be read and written.
         refused: mandatory objects that the node refuses to read.

@@ -74,7 +74,7 @@ class Result:
     """Result of one check in a run.
 
     Attributes:
-        check: check that was executed.
+        check: check to which the result belongs.
         outcome: attempt that decides the verdict.
         first: attempt before `outcome`, or None if the check was not repeated.
     """

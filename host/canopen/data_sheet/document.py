@@ -99,7 +99,7 @@ class Document:
         return self._entries.get(index, [])
 
     def section_of(self, row: EntryDescription) -> str:
-        """Return the section of an entry. Without its own section, return that of its object."""
+        """Return the section of an entry, or the section of its object if the entry has none."""
         section = f"{row.index:04X}sub{row.sub:X}"
         return section if section in self.file.sections else f"{row.index:04X}"
 

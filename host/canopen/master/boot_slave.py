@@ -385,8 +385,8 @@ class SlaveBoot:
 
     As in Lely's master, two functions are missing:
 
-    - the object 1F20h, which contains a DCF as text - the boot-up of a slave that another node
-    configures (1F25h)
+    - the object 1F20h, which contains a DCF as text
+    - the boot-up of a slave that another node configures (1F25h)
 
     Args:
         slave: settings that the master has for the slave, such as its expected identity.

@@ -68,7 +68,7 @@ class PortConnections:
     def forget(self, first: str, second: str) -> bool:
         """Remove a connection from those that are still to be made.
 
-        Return False if the connection was not still to be made.
+        Return False if the connection was not waiting to be made.
         """
         ends = {first, second}
         waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]

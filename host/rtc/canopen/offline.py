@@ -70,8 +70,8 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     Return a text for each setting that a node will refuse.
 
     The check assumes that the nodes match their EDS. There is also a text for each COB-ID with
-    which several nodes send a PDO, although no node refuses this. A node whose EDS lacks values is
-    not checked, and neither is a component that does not exist.
+    which several nodes send a PDO, although no node refuses this. Nodes whose EDS lacks values are
+    not checked. Components that do not exist are not checked either.
 
     Args:
         server: server that gets proxies without devices. The server cannot be used otherwise

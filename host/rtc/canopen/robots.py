@@ -174,7 +174,7 @@ class Beego(WheeledBase):
     """Component for the robot beego, which has two wheels on CANopen drives of the type EPOS.
 
     The component sends motor velocities in rpm to the drives, and reads their positions in counts.
-    The maker does not publish the dimensions of the robot, so the configuration has those of
+    The dimensions of the real robot are not available, so the configuration has those of
     `examples/rigs/beego.toml`.
 
     Attributes:

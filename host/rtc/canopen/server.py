@@ -85,13 +85,12 @@ class ServerObjects:
     |---|---|
     | 1000h | device type, 000001CCh |
     | 1001h | error register, 0 |
-    | 1005h, 1006h | COB-ID SYNC, with bit 30 if the server sends SYNC; communication cycle period,
-    us |
+    | 1005h, 1006h | COB-ID SYNC (bit 30: the server sends SYNC); communication cycle period, us |
     | 1016h | consumer heartbeat time of each node |
     | 1017h | producer heartbeat time |
     | 1018h | identity: vendor-ID 0, which is not assigned |
 
-    The server does not emulate SDO writing and the transfer in segments and blocks, because every
+    The server does not emulate SDO writing. Segments and blocks are not needed, because every
     object has at most four bytes.
 
     Args:

@@ -510,9 +510,8 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         Returns:
             INVALID_ARGS if the value cannot be encoded. If the buffer does not accept the value,
             the result is the status of the buffer. If the buffer accepts the value, the result is
-            the status that the other process returned for an earlier value, the latest that was
-            sent: PORT_OK, an error such as BUFFER_FULL, or CONNECTION_LOST if the process did not
-            answer.
+            what the other process returned for the value that was sent last: PORT_OK, an error such
+            as BUFFER_FULL, or CONNECTION_LOST if the process did not answer.
         """
         try:
             payload = self._codec.encode(value)

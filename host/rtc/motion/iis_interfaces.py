@@ -162,7 +162,7 @@ class RunningInformation(RtComponent):
     The velocity is given in the coordinates of the robot. It is calculated from the latest two
     poses, and its time `tm` is the time of the later one. If the latest pose is older than
     `timeout`, the velocity is 0. Use an execution context with a rate of at least 100 Hz.
-    Otherwise, a warning is logged.
+    A slower context is reported in the log.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")

@@ -29,7 +29,7 @@ _POWER_OFF_MS: Final = 200
 class StepPlayer:
     """Player that executes the steps of a conformance check on the bus, one after the other.
 
-    The names in the steps were replaced before by the objects and values of the node.
+    The names in the steps must already be replaced by objects and values of the node.
 
     Args:
         exchange: bus with the node.
