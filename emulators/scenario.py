@@ -105,7 +105,8 @@ class ScenarioParser:
         device: device whose inputs and outputs the scenario may name.
         operator: operator of the device, which determines the valid actions.
         encoders: further verbs that send a line, in addition to `send`.
-        senders: sending verbs for a wire without text lines, in place of `send` and the encoders.
+        senders: verbs that send data on a wire without text lines. If they are given, they replace
+            `send` and the encoders.
     """
 
     def __init__(

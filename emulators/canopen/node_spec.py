@@ -31,7 +31,7 @@ class NodeSpec:
 
 
 def parse_node(text: str) -> Iterator[NodeSpec]:
-    """Yield the nodes that the text of an option `--node` specifies.
+    """Yield the CANopen nodes that a user specifies with an option `--node`.
 
     The text has one of the forms `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` and
     `a.dcf`. A name such as `epos` means the model, unless a file of this name exists.

@@ -61,9 +61,9 @@ def object_name(dictionary: Dictionary, entry: Entry) -> str:
 
 
 def find_object(dictionary: Dictionary, name: str) -> Entry | None:
-    """Return the entry of a dictionary that a name such as `0x6000:1` means, or None without one.
+    """Return the object that a name such as `0x6000:1` means, or None if there is no such object.
 
-    `0x6000` means `0x6000:0`.
+    The name `0x6000` without a sub-index means `0x6000:0`.
     """
     match = _NAME.fullmatch(name)
     if match is None:
@@ -80,8 +80,8 @@ class ObjectSignal:
     """An object of the dictionary as a signal, which is read and set inside the device.
 
     The bus is not used. Access rights are ignored, except that a constant cannot be changed. The
-    service that owns an object checks a new value and acts on it like on a value from the bus. So a
-    heartbeat time that is set here takes effect. The value changes at the start of the node's next
+    service to which an object belongs checks a new value and uses it like a value from the bus. For
+    example, a new heartbeat time takes effect. The value changes at the start of the node's next
     tick.
 
     Args:
@@ -197,7 +197,7 @@ _COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
 
 class SwitchSignal:
-    """A physical fault that every node has, such as a power cut, as a signal: 0 or 1.
+    """Signal for a physical fault that every node has, such as a power cut; its value is 0 or 1.
 
     See `NodeSignal`.
 
@@ -300,12 +300,12 @@ OnSet = Callable[[str, Setting], None]
 
 
 class NotedSignal:
-    """A signal that forwards to another signal, and reports when that is set.
+    """Wrapper of a signal that calls a function after each change of the wrapped signal.
 
     See `NodeSignal`.
 
     Args:
-        signal: the other signal.
+        signal: the wrapped signal.
         note: function that is called after each change.
     """
 

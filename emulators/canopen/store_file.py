@@ -25,8 +25,8 @@ class StoreError(ValueError):
 class StoreFile:
     """A file that keeps the non-volatile memory of slaves between runs of the emulator.
 
-    It contains what slaves store by 1010h and LSS. The file is replaced as a whole, so it is never
-    half written.
+    The file contains the data that slaves store by the object 1010h and by LSS. It is replaced as a
+    whole, so it is never incomplete.
 
     Args:
         path: path of the file, which may be missing.

@@ -22,9 +22,9 @@ _PLOTTER: Final = "matplotlib"
 
 
 def check_plot(path: Path, option: str = "--plot", *others: str) -> None:
-    """Check before a run that its picture can be written after the run.
+    """Check before a run that a picture of the run can be written when the run is over.
 
-    If it cannot, the command ends with a message.
+    If the picture cannot be written, the command ends with a message.
 
     Args:
         path: path of the picture.

@@ -61,7 +61,7 @@ def _field_option(field: DeviceField) -> Decorator:
 def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
     """Return a decorator that adds the options of all emulators to a click command.
 
-    They are the fields of `run.RunOptions`, and `--version`.
+    These options are the fields of `run.RunOptions`, and `--version`.
 
     Args:
         wire_faults: names of wire faults, separated by commas.
@@ -104,7 +104,7 @@ panel_option: Final[Decorator] = click.option(
 def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSignal]]) -> Decorator:
     """Return a decorator that adds the options of all devices on a serial line to a click command.
 
-    They are `--link`, `--serve`, `--trace` and those of `run_options`.
+    These options are `--link`, `--serve`, `--trace` and the options that `run_options` adds.
 
     Args:
         wire_faults: names of wire faults, separated by commas.

@@ -45,7 +45,8 @@ class CurveSample(NamedTuple):
     Attributes:
         time_s: seconds since the potentiometer was first turned.
         volts: voltage at the analogue input of the palette.
-        reference: latest value received with the PDO 290h, 6411h:01 of the motor core unit.
+        reference: latest reference value of the motor core unit, which is its object 6411h:01. The
+            unit receives the value with the PDO 290h.
         angle_deg: angle of the motor's shaft.
     """
 
@@ -282,7 +283,7 @@ _Fig120Stage = VirtualStage | _BusStage
 def bus_stage(
     arguments: Sequence[str], open_bus: Callable[[], can.BusABC]
 ) -> Iterator[_Fig120Stage]:
-    """Context in which the emulator and a master run on the same real CAN bus, for a demonstration.
+    """Context manager that runs an emulator and opens a bus for a master, both on one real CAN bus.
 
     Args:
         arguments: arguments of the emulator's command line that select the bus.

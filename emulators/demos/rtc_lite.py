@@ -96,9 +96,9 @@ _DemoSetup = VirtualSetup | _PtySetup
 
 @contextmanager
 def pty_setup() -> Iterator[_PtySetup]:
-    """Context with the nodes of the RTC-Lite demonstration as emulators in processes of their own.
+    """Context manager that runs each node of the RTC-Lite demonstration in its own process.
 
-    The host reaches them by terminals (ptys), in real time.
+    The nodes are emulated in real time, and the host reaches each node by a pseudo-terminal (pty).
 
     Raises:
         RuntimeError: an emulator does not start.
@@ -138,7 +138,7 @@ _SETTINGS: Final = ProxySettings(rediscover=True)
 
 
 def run_demo(setup: _DemoSetup, echo: _Echo) -> None:
-    """Run the RTC-Lite demonstration, which takes six seconds, either real or virtual.
+    """Run the RTC-Lite demonstration, which takes six seconds of real or virtual time.
 
     Args:
         setup: nodes of the demonstration, in virtual time or as processes.

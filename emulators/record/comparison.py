@@ -114,8 +114,8 @@ class Tolerance:
             added.
         numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
-        kinds: patterns of lines that are independent of all other lines. Such lines may come in
-            another order than recorded.
+        kinds: patterns of lines that are independent of all other lines. The emulator may send such
+            a line earlier or later than other lines, in an order that differs from the recording.
     """
 
     time_us: int
@@ -151,7 +151,7 @@ class Tolerance:
 
 
 class Said(NamedTuple):
-    """A line or frame that a device has sent, as `compare` gets it.
+    """A line or frame that a device has sent, for the function `compare`.
 
     Attributes:
         at_us: time at which the line or frame ended, in microseconds since the start of the

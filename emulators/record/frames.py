@@ -89,7 +89,8 @@ class FrameFormat(Immutable):
             request: function that gets a frame of the host, and returns its fields by name. An
                 object with such a method `parse` is accepted, too, for example a Struct of
                 construct. An invalid frame raises an exception.
-            answer: the same for frames of the device. The default is `request`.
+            answer: function that gets a frame of the device, and returns its fields in the same
+                way. The default is `request`.
 
         Returns:
             The copy of the rule.
@@ -134,7 +135,7 @@ class FrameFormat(Immutable):
 
 
 class FrameSplitter(Copyable):
-    """Splits received bytes of a serial line into frames, in whatever chunks the bytes arrive.
+    """Splits received bytes of a serial line into frames. The bytes may arrive in any chunks.
 
     Args:
         rule: rule that defines where a frame ends.
@@ -384,7 +385,7 @@ class _ByLength(Immutable):
 
 
 def hex_text(data: bytes) -> str:
-    """Return bytes as hex digits in groups of four; long data are cut and followed by their size.
+    """Return bytes as hex digits in groups of four. Long data are cut, and their size is added.
 
     >>> hex_text(bytes.fromhex("0103 0452 4801"))
     '01030452 4801'

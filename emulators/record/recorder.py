@@ -197,7 +197,7 @@ class TracedDevice(DeviceBefore[W]):
 
     @property
     def due_us(self) -> int:
-        """Time at which the device must be called next, or 0 if a change is not recorded yet."""
+        """Time at which the device must be called next. It is 0 if a change is not recorded yet."""
         if self._done:
             return 0  # a tick that is not due changes nothing, and a replay resets where it was
         return self._device.due_us  # type: ignore[no-any-return]  # a Device, asked in each tick
@@ -245,7 +245,7 @@ _BUS_STATE = {state: text for text, state in BUS_STATE.items()}
 
 
 class Tick(NamedTuple):
-    """What happened to a device in one tick of a recording, or to a wire between ticks (mark `~`).
+    """Everything that a recording has about one device in one tick, or about a wire between ticks.
 
     Attributes:
         at_us: time of the tick in microseconds.
@@ -253,7 +253,7 @@ class Tick(NamedTuple):
         done: actions before the tick, such as `stick=5`.
         received: bytes or frames that the device received.
         sent: bytes or frames that the device sent.
-        mark: mark that the actions have in the trace.
+        mark: mark that the actions have in the trace. The mark `~` stands for a wire.
     """
 
     at_us: int
@@ -322,8 +322,8 @@ class TraceRecorder(Copyable):
 
         Args:
             name: name of the device in the header.
-            device: the device. It is recorded from its first tick on, including changes of its
-                `inputs`, and of objects that a node itself sets.
+            device: the device. From its first tick on, the recording has its traffic, the changes
+                of its `inputs`, and the changes of objects that a CANopen node sets itself.
 
         Raises:
             KeyError: the header has no such device.
@@ -390,7 +390,7 @@ class TraceRecorder(Copyable):
             now_us: present time of the rig in microseconds.
 
         Raises:
-            ValueError: the run is already recorded in a file, and so not kept in memory.
+            ValueError: the run is not kept in memory, because it is already recorded in a file.
             OSError: the file cannot be written.
         """
         if self._forgetful:

@@ -408,8 +408,8 @@ def traffic_of(
 ) -> Iterator[tuple[int, _Traffic, int]]:
     """Yield the traffic of one direction, joined by tick.
 
-    Each item has the time of the tick, all bytes or frames of this tick, and the number of their
-    first line in the trace.
+    Each item has the time of a tick and all bytes or frames of this tick. The last part of an item
+    is the line number in the trace at which these data begin.
     """
     together: list[Any] = []
     at_us = line = -1
@@ -430,7 +430,7 @@ def _joined(together: list[Any]) -> _Traffic:
 
 
 def do(device: Any, record: BenchRecord) -> None:
-    """Repeat on a device a recorded action: a reset, a set input, or a state of the CAN controller.
+    """Repeat a recorded action on a device, such as a reset or a new value of an input.
 
     Raises:
         TraceError: an input is unknown, or a value is invalid.

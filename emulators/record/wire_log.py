@@ -74,9 +74,10 @@ class WireLog:
         self._wake: Callable[[int], None] | None = None
 
     def follow(self, rig: Rig, name: str) -> None:
-        """Log a frame that a silence ends as soon as the silence is long enough.
+        """From now on, log a frame as soon as the silence after the frame is long enough.
 
-        Without this call such a frame is logged only with the next traffic.
+        This is for lines on which a silence ends a frame. Without this call such a frame is logged
+        only when the next traffic arrives.
 
         Args:
             rig: the rig whose time ends the silence.
@@ -119,11 +120,11 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return the incomplete line or frame of each direction; it has the number 0.
+        """Return the incomplete line or frame of each direction, as an entry with the number 0.
 
         Args:
-            by_gap: whether to return only frames that a silence ends, which may already be
-                complete. If false, only other lines and frames are returned.
+            by_gap: if true, only frames that end by a silence are returned. Such a frame may
+                already be complete. If false, only the other lines and frames are returned.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

@@ -46,9 +46,8 @@ class Mounted:
 class MountedUrg(Mounted):
     """An emulated URG range finder mounted on a robot base, in front of the axle.
 
-    The sensor moves with the base and sees the surroundings and other robots. Not emulated: the
-    robot's own body in the sensor's view, and the true outline of other robots, which are seen as
-    round.
+    The sensor moves with the base and sees the surroundings and other robots. The sensor does not
+    see the robot's own body, and it sees every other robot as a circle.
 
     Args:
         base: base that carries the sensor.

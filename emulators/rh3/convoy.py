@@ -28,9 +28,9 @@ _WATCHDOG_US: Final = 500_000
 class OmniCart(RtComponent):
     """RT component that emulates a robot on three omni wheels.
 
-    It follows velocities of the type IIS::TimedVelocity2D with all three parts, forward, left and
-    turning, and writes its true pose. A velocity with NaN means stop. Not emulated: a motor driver
-    and its serial line, encoders, odometry errors.
+    The robot follows velocities of the type IIS::TimedVelocity2D, which have three parts: forward,
+    left and turning. The component writes the true pose of the robot. A velocity with NaN stops the
+    robot. A motor driver, its serial line, encoders and odometry errors are not emulated.
 
     Attributes:
         body: the emulated wheels and their pose.
@@ -78,13 +78,14 @@ class OmniCart(RtComponent):
 class MovingControl(RtComponent):
     """RT component that drives a base by a joystick, and stops it when the joystick stops sending.
 
-    The component RefHardRh3 keeps the latest velocity. Without this component the base would
-    therefore go on if the connector to the joystick were removed while the stick is pushed.
+    The component RefHardRh3, which drives the base, keeps the latest velocity. Without
+    MovingControl the base would therefore continue to move if the connector to the joystick were
+    removed while the stick is pushed.
 
     Args:
         instance_name: instance name of the component.
-        phase: phase of the common interface, which selects the type of the velocities: 1 for
-            RTC::TimedVelocity, or 2 for IIS::TimedVelocity.
+        phase: phase (version) of the common interface. In phase 1 velocities have the type
+            RTC::TimedVelocity, and in phase 2 the type IIS::TimedVelocity.
 
     Attributes:
         twist: latest velocity forward and to the left in m/s, and turning rate in rad/s, or None

@@ -354,7 +354,7 @@ def _by_bare_name(name: str, names: Iterable[str]) -> dict[str, str]:
 
 
 def near_fault(name: str, names: Iterable[str], inputs: Iterable[str] = ()) -> str:
-    """Return a hint for an unknown fault name: a similar fault, an input to set, or all faults.
+    """Return a hint for an unknown fault name, such as a similar name, or the names of all faults.
 
     Args:
         name: the unknown name.
@@ -414,10 +414,10 @@ class FaultTrigger(Copyable):
     """Decides at each opportunity whether a fault acts, from its rate, count and random numbers.
 
     Args:
-        chance: random generator of the trigger, from which the fault may also draw.
+        chance: random generator of the trigger. The fault may also use this generator.
         arguments: arguments of the fault, with rate and count.
-        tally: counter that limits how often the fault acts. A fault of both directions has two
-            triggers with one counter.
+        tally: counter that limits how often the fault acts. A fault in both directions has a
+            trigger for each direction, and both triggers use the same counter.
     """
 
     __slots__ = ("chance", "tally", "threshold")
@@ -569,8 +569,9 @@ class FaultyPort(Copyable, Generic[W]):
     def clear(self, name: str) -> None:
         """End an armed fault; do nothing if the fault is not armed.
 
-        Traffic that the fault only delays still arrives at its delayed time, and later traffic does
-        not overtake it. Other traffic that the fault holds back is lost.
+        If the fault has only delayed traffic, this traffic still arrives at its delayed time, and
+        before all later traffic. If the fault holds back traffic for another reason, this traffic
+        is lost.
         """
         for faults in (self._to_device, self._from_device):
             fault = faults.get(name)

@@ -23,7 +23,7 @@ class Port(Protocol[W]):
         ...
 
     def poll(self, now_us: int, /) -> W:
-        """Return the traffic that has arrived since the last call by `now_us`, in wire order."""
+        """Return the traffic that has arrived between the last call and `now_us`, in its order."""
         ...
 
     def send(self, now_us: int, traffic: W, /) -> None:
@@ -40,10 +40,10 @@ class LineUart(Part):
         setting: the setting after the latest change.
         since_us: time from which the present setting applies, in microseconds.
         listeners: functions that are called with `since_us` and the new setting. A copy of the line
-            has them, too.
-        error_listeners: functions that are called when a fault has spoiled characters, with the
+            has the same functions.
+        error_listeners: functions that are called when a fault has spoiled characters. They get the
             direction, the error that a UART detects (`framing`, `parity`, `breaks`), and the number
-            of characters. A copy of the line has them, too.
+            of characters. A copy of the line has the same functions.
     """
 
     def __init__(self, setting: UartSetting) -> None:
@@ -80,7 +80,8 @@ class ByteEnd(Port[bytes], Protocol):
     def arrival_us(self, count: int) -> int:
         """Return the time at which `count` bytes will have arrived at this end.
 
-        If the time is not known yet, the result is the time to ask again, or `NEVER`.
+        If this time is not known yet, the result is the time at which to call this method again, or
+        `NEVER`.
         """
         ...
 
@@ -97,7 +98,7 @@ class ByteEnd(Port[bytes], Protocol):
     def sent_us(self) -> int:
         """Time at which the last byte from this end will have been sent.
 
-        If all bytes have been sent, the time is in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past, or `NEVER`.
         """
         ...
 

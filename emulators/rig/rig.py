@@ -69,9 +69,9 @@ from tickrig.wire.instant import NEVER, next_tick_us
 class Coupling(Protocol):
     """Protocol of a mechanical connection of devices, such as a belt between two shafts.
 
-    A coupling acts after all devices of a step have computed. It reads their outputs and may set
-    their inputs, which take effect in the next tick. So the result does not depend on the order of
-    the devices.
+    A coupling acts after all devices of a step have computed. It reads the outputs of devices and
+    may set inputs of devices. The inputs take effect in the next tick. Therefore the result does
+    not depend on the order of the devices.
     """
 
     @property
@@ -168,7 +168,7 @@ class _Wires(Part):
         Arriving traffic wakes the device that receives it.
 
         Args:
-            until_us: time to which the wires advance at most, in microseconds.
+            until_us: latest time to which the wires advance, in microseconds.
             hosts: hosts for which arriving traffic also stops the advance.
 
         Returns:
@@ -370,8 +370,8 @@ class Rig(Copyable):
     def snapshot(self, *parts: object) -> MachineSnapshot:
         """Return a snapshot that can restore the present state of the rig any number of times.
 
-        The snapshot restores this rig itself, so references to the ends of its wires stay valid.
-        Making a snapshot takes a twentieth of the time of a `fork`.
+        The snapshot restores this rig itself, so references to the ends of its wires stay valid. A
+        snapshot is made in a twentieth of the time of a copy by `fork`.
 
         Args:
             parts: further objects that are restored with the rig, such as a host.
@@ -401,7 +401,7 @@ class Rig(Copyable):
     def move_on(self, wire: Wire) -> None:
         """Let the rig advance a wire together with its own time.
 
-        Wires on which the rig has a device need no such call.
+        The rig already advances each wire on which it has a device, so such a wire needs no call.
 
         Args:
             wire: wire to advance.
@@ -433,7 +433,8 @@ class Rig(Copyable):
             t_us: end of the run, in microseconds since the start of the rig.
             host: host whose traffic ends the run early, or None to run to the end.
             unseen_us: time after `t_us` in which the caller will probably not read devices or set
-                inputs between ticks. If the caller does so nevertheless, the run is only slower.
+                inputs between ticks. This only makes the run faster: the result is right even if
+                the caller does read devices or set inputs.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):

@@ -88,8 +88,8 @@ class SimLink:
 class RigClock:
     """Clock for RT components that advances the virtual time of a rig while it waits.
 
-    So a system of RT components (`host.rtc.real_time`) and the emulated devices that it drives run
-    in virtual time together.
+    With this clock, a system of RT components (`host.rtc.real_time`) and the emulated devices that
+    the components drive run together in virtual time.
 
     Args:
         rig: rig that is advanced while the caller waits.

@@ -71,7 +71,7 @@ class Looks(Copyable):
     def refusal(self, now_us: int, instead: str) -> str:
         """Count a poll without result, and return an error message if there were too many.
 
-        If there were not, the result is an empty text.
+        If the number of polls is still allowed, the result is an empty text.
 
         Args:
             now_us: present time in microseconds.
@@ -89,9 +89,9 @@ class Looks(Copyable):
 
 
 class HostLimit(Copyable):
-    """Interface of a limit on the waits of hosts. This class sets no limit, subclasses do.
+    """Base class for a limit on the waits of hosts. Only subclasses set a limit.
 
-    A host that advances the time first calls `count` if `due_us` has passed.
+    Before a host advances the time, it calls `count` if the time `due_us` has passed.
 
     Attributes:
         due_us: time from which the next wait of a host is counted, in microseconds.

@@ -103,8 +103,8 @@ class _UartPort(Copyable, Generic[W]):
 class Timetable(TimetableFields):
     """The ticks in which devices of a rig have work, in order of time, each with its stations.
 
-    A station is a device at its port. It has one valid tick, `station.at_us`. Older entries of the
-    station at later ticks are ignored.
+    A station is a device at its port. The rig calls a station at the tick `station.at_us`. If the
+    timetable has older entries of the station at later ticks, they are ignored.
 
     Attributes:
         first_us: time of the first tick with work, or `NEVER` if there is none.
@@ -122,7 +122,7 @@ class Timetable(TimetableFields):
 
     @in_kernel
     def enter(self, station: Station[Any], at_us: int) -> None:
-        """Plan a call of a station (a device at its port) at its first tick from `at_us` on.
+        """Plan to call a station (a device at its port) in its first tick at or after `at_us`.
 
         If an earlier tick is already planned for the station, that tick stays planned.
         """

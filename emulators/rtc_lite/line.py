@@ -207,10 +207,10 @@ class RadioSettings:
         latency_us: shortest delay of a packet, in microseconds.
         jitter_us: largest random additional delay. Packets keep their order.
         gap_us: silence after which the radio sends the collected bytes as one packet.
-        up_us: mean time from one dropout to the next, or 0 for no dropouts. The actual time is
-            random, within half of the mean.
-        dropout_us: mean duration of a dropout. The actual duration is random, within half of the
-            mean.
+        up_us: mean time from one dropout to the next, or 0 for no dropouts. Each actual time is
+            random, between half and one and a half of the mean.
+        dropout_us: mean duration of a dropout. Each actual duration is random, between half and one
+            and a half of the mean.
     """
 
     latency_us: int = 15_000

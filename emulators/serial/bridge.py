@@ -36,7 +36,7 @@ class HostSetting:
         self.differing = ""
 
     def want(self, wanted: str) -> None:
-        """Compare the host's setting with a new setting of the device from now on.
+        """From now on, compare the host's setting with a new setting of the device.
 
         Args:
             wanted: new setting of the device, or empty if the device accepts any setting of the
@@ -98,10 +98,11 @@ class Bridge:
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Put on the emulated line what hosts outside have written since the last poll.
+        """Send on the emulated line the data that outside hosts have written since the last poll.
 
-        The hosts may have written at any time since the last poll. Their data are sent as if
-        written right after the last poll, so that polling does not delay them by a tick.
+        It is not known when a host has written its data since the last poll. The data are sent as
+        if they had been written right after the last poll. Therefore polling does not delay them by
+        a tick.
         """
         if self._pending:
             self._attend(now_us)
@@ -160,7 +161,8 @@ class HostEnd:
     def arrival_us(self, count: int) -> int:
         """Return the time at which `count` bytes will have arrived at this end.
 
-        If the time is not known yet, the result is the time to ask again, or `NEVER`.
+        If this time is not known yet, the result is the time at which to call this method again, or
+        `NEVER`.
         """
         return self._end.arrival_us(count)
 
@@ -190,7 +192,7 @@ class HostEnd:
     def sent_us(self) -> int:
         """Time at which the last byte of the host will have been sent.
 
-        If all bytes have been sent, the time is in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past, or `NEVER`.
         """
         return self._end.sent_us
 
@@ -250,7 +252,7 @@ class Tap(Copyable, Generic[W]):
     def sent_us(self) -> int:
         """Time at which the line will have sent all data of this port.
 
-        It is `NEVER` if the data have been sent, or if the time is unknown.
+        The result is `NEVER` if all data have been sent, or if the time is unknown.
         """
         return getattr(self._port, "sent_us", NEVER)
 

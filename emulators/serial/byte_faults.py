@@ -222,7 +222,7 @@ class _Late(ByteFault, HoldingFault[bytes]):
         self._queue, self._free_us = other._queue, other._free_us
 
     def sent(self, until_us: int) -> None:
-        """Start the next pause of the fault not before the line has sent the latest bytes.
+        """Delay the next pause of the fault until the line has sent the latest bytes.
 
         Args:
             until_us: time at which the last byte has been sent, in microseconds.

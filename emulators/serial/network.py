@@ -125,7 +125,8 @@ class DismissedHost:
     """Connection to a refused host, which stays open for a second so that the host can read why.
 
     If a connection is closed while its host still sends, the connection is reset. Some systems then
-    drop data that the host has not read yet. So data from a refused host are read and dropped.
+    discard data that the host has not read yet, such as the reason. To avoid a reset, this object
+    reads the data of the refused host and discards the data.
 
     Args:
         connection: connection to the host.
@@ -207,8 +208,7 @@ class HostConnection:
     def has_ended(self, now_us: int) -> bool:
         """Return whether the line is free for another host.
 
-        That is the case if this host has stopped sending, or does not read its data for a long
-        time.
+        The line is free if this host has stopped sending, or has not read its data for a long time.
         """
         stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US
         return self.over or stuck or self._last_words_us is not None
@@ -223,9 +223,9 @@ class HostConnection:
         return data
 
     def hold(self, now_us: int) -> None:
-        """Negotiate with a host that waits until another host leaves the line, and hold its data.
+        """Negotiate with a host that waits because another host uses the line, and keep its data.
 
-        Only the first part of its data is read and held.
+        Only the first part of the waiting host's data is read and kept.
         """
         if len(self._held) < READ_BYTES and not self.has_ended(now_us):
             self._held += self._look(now_us)
@@ -339,7 +339,7 @@ class _QuietAdapter(SerialBase):
     cts = dsr = ri = cd = False
 
     def reset_input_buffer(self) -> None:
-        """Do nothing. pyserial calls this to purge received data, but here the host drops them."""
+        """Do nothing. The host itself drops received data if it asks to purge the data."""
 
     def reset_output_buffer(self) -> None:
         """Do nothing: earlier data are already on the line."""
@@ -381,12 +381,13 @@ class _SafePortManager(PortManager):
 class Rfc2217Connection(HostConnection):
     """Connection to a host that may set the serial port by RFC 2217.
 
-    An example of such a host is pyserial's `rfc2217://`. Settings that the host requests are
-    acknowledged and stored, but the device keeps its own setting. DTR, RTS and break of the host
-    have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet data is
-    disconnected.
+    For example, pyserial is such a host if it opens a URL `rfc2217://`. Settings that the host
+    requests are acknowledged and stored, but the device keeps its own setting. DTR, RTS and break
+    of the host have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet data
+    is disconnected.
 
-    Not emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
+    Two requests of RFC 2217 are not emulated: FLOWCONTROL-SUSPEND, and the purging of data that are
+    already on the line.
 
     Args:
         connection: connection to the host.
@@ -508,7 +509,7 @@ class NetworkPort(NonCopyable):
     def host_setting(self) -> str:
         """The setting of the host, such as `9600 8N1`, if it differs from the device's.
 
-        Otherwise, or if the setting is unknown, the text is empty.
+        The text is empty if both settings are equal, or if the setting of the host is unknown.
         """
         return self._setting.differing if self._setting else ""
 
@@ -524,9 +525,9 @@ class NetworkPort(NonCopyable):
             self._setting = HostSetting(self._shown_setting, str(self._uart), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Follow a new setting of the device: a host with another setting now gets garbled data.
+        """Note a new setting of the device; a host with another setting now gets garbled data.
 
-        The data are those that UARTs with the two settings would receive.
+        The garbled data are those that a real UART with the host's setting would receive.
 
         Args:
             setting: new setting of the device. If the rate is above 4 Mbit/s, the device
@@ -564,7 +565,7 @@ class NetworkPort(NonCopyable):
             self._setting.look(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send data to the host, and buffer what the host does not read.
+        """Send data to the host, and keep data that the host has not read yet in a buffer.
 
         Without a host the data are lost.
         """

@@ -233,7 +233,7 @@ class PtyPort(NonCopyable):
     def host_setting(self) -> str:
         """The setting of the host, such as `9600 8N1`, if it differs from the device's.
 
-        Otherwise, or if the setting is unknown, the text is empty.
+        The text is empty if both settings are equal, or if the setting of the host is unknown.
         """
         return self._setting.differing if self._setting else ""
 
@@ -254,7 +254,7 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Compare the setting of hosts with a new setting of the device from now on.
+        """From now on, compare the setting of each host with a new setting of the device.
 
         The bytes are not changed, because a pty transmits without a bit rate.
 

@@ -120,7 +120,7 @@ class Rs485Line(Copyable):
         return end_us
 
     def cut(self, sender: Rs485End, now_us: int) -> int:
-        """Discard bytes that a station has queued, except the byte that is being sent.
+        """Discard the bytes that a station has still to send, except the byte in transmission.
 
         Args:
             sender: end of the station.
@@ -142,7 +142,7 @@ class Rs485Line(Copyable):
         return end_us
 
     def after(self, count: int) -> int:
-        """Return how long bytes take on the line.
+        """Return the time that the line needs to transmit a number of bytes.
 
         Args:
             count: number of bytes.

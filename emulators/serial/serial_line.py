@@ -108,7 +108,7 @@ class LineEnd(Part):
             listener(since_us, setting)
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Take back the bytes that this end has sent and that have not arrived yet.
+        """Cancel all bytes that this end has sent and that have not arrived at the other end yet.
 
         Args:
             now_us: present time in microseconds.
@@ -153,7 +153,7 @@ class LineEnd(Part):
     def sent_us(self) -> int:
         """Time at which the last byte of this end will have been sent.
 
-        If all bytes have been sent, the time is in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past, or `NEVER`.
         """
         return self._out.last_us
 

@@ -249,9 +249,9 @@ class _Closable(Protocol):
 
 
 class BoardLines:
-    """Opens lines to devices for the RT components of an emulated board, and cuts all of them.
+    """Opens the lines from an emulated board to its devices, for the RT components of the board.
 
-    They are cut when the board loses its supply.
+    When the board loses its supply, this object cuts all lines that it has opened.
 
     Args:
         open_urg: function that opens the line of a range finder.
@@ -297,9 +297,10 @@ def add_range_finder(manager: NodeManager, lines: BoardLines, device: str) -> No
 def add_position_detection(
     manager: NodeManager, lines: BoardLines, device: str, service: str = ""
 ) -> None:
-    """Add the RT components for position detection by ucodes to a board, connect and activate them.
+    """Add to a board the RT components that detect a position by ucodes, and activate them.
 
-    The components are reader, settlement and interpretation.
+    These are three components: reader, settlement and interpretation. They are connected with each
+    other before they are activated.
 
     Args:
         manager: the manager of the board's RT components.

@@ -10,9 +10,9 @@ from tickrig.emulators.rig.event_queue import EventQueue
 
 
 class Operated:
-    """An emulated object without a wire whose inputs an operator sets, now or at a later time.
+    """An emulated object that has no wire. An operator sets its inputs, at once or at a later time.
 
-    `EmulatorControl` answers requests about it.
+    `EmulatorControl` answers requests about the object.
 
     Args:
         name: name of the object.

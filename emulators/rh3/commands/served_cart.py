@@ -61,7 +61,7 @@ class ServedCart:
         clock: clock that waits for each period.
 
     Attributes:
-        running: whether the cart runs, which is false after `stop` was called.
+        running: whether the cart runs. The value is false after a call of `stop`.
         after_tick: functions that are called after each period, with the time in microseconds.
         server: server of the control socket, or None without a control socket.
     """

@@ -11,9 +11,9 @@ class Serial(SimSerial):
     """pyserial port for a URL `tickrig://NAME`, which `serial.serial_for_url` opens.
 
     The name in the URL is looked up when the port is opened. As with any pyserial port, the default
-    setting is 9600 8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects
-    what happens if the settings of port and device differ. Without it, the code that offers the
-    name selects this.
+    setting is 9600 8N1, whatever the device uses. If the settings of port and device differ, the
+    option `?mismatch=errors` or `?mismatch=refuse` of the URL selects what happens. A URL without
+    this option uses the choice of the code that offers the name.
 
     Args:
         port: URL, which is opened at once, or None to open the port later.

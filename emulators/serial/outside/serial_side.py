@@ -84,7 +84,7 @@ class ModemLines(Copyable):
 
     @property
     def cts(self) -> bool:
-        """State of the signal Clear To Send. A port with `rtscts` sends only while it is on."""
+        """State of the signal CTS (Clear To Send), which a port with `rtscts` needs for sending."""
         return self._cts
 
     @cts.setter
@@ -98,7 +98,7 @@ class ModemLines(Copyable):
 
 
 class HostReceiver(Copyable):
-    """Receiving UART of a host: samples the bytes of an emulated line with the host's setting.
+    """Receiving UART of a host, which samples the bytes of an emulated line with its own setting.
 
     If the settings of host and device differ, a character of the host may end within a byte of the
     device. Such a character becomes available when that byte has passed. A character with an error
@@ -124,7 +124,7 @@ class HostReceiver(Copyable):
         self._received: deque[Character] = deque()
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Receive the bytes that the device sends with its new setting; the host's setting stays.
+        """Note the new setting with which the device sends; the host keeps its own setting.
 
         Args:
             device: new setting of the device.
@@ -170,7 +170,7 @@ class HostReceiver(Copyable):
     def arrival_us(self, count: int) -> int:
         """Return the time at which the host can read `count` characters.
 
-        If the time is not known yet, the result is the time to ask again.
+        If this time is not known yet, the result is the time at which to call this method again.
 
         Args:
             count: number of characters, at least 1.
@@ -468,9 +468,9 @@ class HostWaits(Copyable):
             raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
-        """Return the time at which a timeout ends that starts now, in microseconds.
+        """Return the end of a timeout that starts now, as a time in microseconds.
 
-        Without a timeout it is the time at which `give_up` ends an endless wait.
+        Without a timeout, the result is the time at which `give_up` ends an endless wait.
 
         Args:
             timeout_s: timeout in seconds, or None for no timeout.

@@ -170,7 +170,7 @@ class _SimPort(SerialBase):
         return side.modem_lines
 
     def set_output_flow_control(self, enable: bool = True) -> None:
-        """Suspend or resume sending. Bytes written while it is suspended are sent later.
+        """Suspend or resume sending. Bytes that are written in the meantime are sent later.
 
         Args:
             enable: true to send, false to suspend.
@@ -263,7 +263,8 @@ class SimSerial(_SimPort):
         """Open the port, on the line of its rig or on the line that a `tickrig://` URL names.
 
         Raises:
-            SerialException: no rig offers the name; or for the reasons of `_SimPort.open`.
+            SerialException: no rig offers the name in the URL, the port is already open, another
+                port is open on the line, or the setting is refused.
         """
         own_name, own_side = self._own
         if not self.is_open and self.port is not None:

@@ -153,7 +153,7 @@ class BenchDevice:
                 times from now, or `flip=0.001`.
             when: condition that starts the fault, such as `on_line("OK:output", nth=3)`. With a
                 condition, `spec` must not have a time.
-            for_: duration from the start of the fault. By default the fault stays.
+            for_: duration of the fault. By default the fault lasts until it is cleared.
 
         Raises:
             ValueError: the fault is unknown, or its arguments are invalid.
@@ -524,7 +524,8 @@ class Bench(BenchDevice, Closing):
             body: the coroutine. It awaits `sleep`, `until`, `edge`, or tasks that it starts.
 
         Raises:
-            TypeError: the coroutine awaits something else, such as `asyncio.sleep`.
+            TypeError: the coroutine awaits an object that the bench cannot wait for, such as
+                `asyncio.sleep`.
             RuntimeError: an awaited condition does not become true within a day of virtual time, or
                 can never become true.
             AssertionError: the waits of the coroutine together exceed the limit of the bench.
@@ -543,7 +544,7 @@ class Bench(BenchDevice, Closing):
     def meanwhile(self, host: Callable[[int], object]) -> None:
         """Keep a host running while a human answers a question of the bench.
 
-        So watchdogs that the host serves do not expire.
+        Without this, watchdogs that the host must serve would expire during a long answer.
 
         Args:
             host: function of the host that is called repeatedly with a duration in microseconds,
@@ -637,9 +638,9 @@ class Bench(BenchDevice, Closing):
     def snapshot(self, *hosts: object) -> MachineSnapshot:
         """Return a snapshot that can restore the present state of the bench any number of times.
 
-        The snapshot restores the same bench: references to the bench and to its links stay valid.
-        Making a snapshot takes a small part of the time of a `fork`. Restoring removes tasks,
-        triggers and hosts that were added later.
+        The snapshot restores the same bench: references to the bench and to its links stay valid. A
+        snapshot is made much faster than a copy by `fork`. When the snapshot is restored, tasks,
+        triggers and hosts that were added later are removed.
 
         Args:
             hosts: hosts and other objects of a test, which are restored together with the bench.

@@ -66,9 +66,9 @@ _ENDS: Final = (b"host", b"device")
 class Journal(WireLog):
     """Log of a bench: the latest lines, frames and actions on all wires, in order of time.
 
-    A line of text is recorded when the device receives or sends its end. The bytes of a serial line
-    are those that the host sent or received. If a fault has changed data, a further entry with the
-    mark `~` shows the data as sent and as received.
+    A line of text is recorded when the device has received or sent the last byte of the line. The
+    bytes of a serial line are those that the host sent or received. If a fault has changed data, a
+    further entry with the mark `~` shows the data as sent and as received.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Journal(WireLog):
         ends: tuple[bytes, bytes] = _ENDS,
         splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
-        """Return a function that records traffic that a fault has changed, as sent and as received.
+        """Return a function that records both the sent and the received data of a fault.
 
         Args:
             source: name of the line or node.
@@ -170,9 +170,9 @@ class Journal(WireLog):
     def lines(self) -> tuple[WireLine, ...]:
         """Return the kept lines in order of time.
 
-        Frames that only a silence will end are included, although they are not complete. An action
-        has the time of the next tick of its device, so it may have been added before frames that
-        end earlier.
+        The last frame of a line is included even if it is not complete, because only a silence on
+        the line would end it. An action has the time of the next tick of its device. Therefore it
+        may have been added to the journal before frames that end earlier.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
@@ -202,7 +202,7 @@ def _maps(frame: CanFrame) -> bool:
 def text_of(lines: Sequence[WireLine]) -> str:
     """Return the lines of a journal as text.
 
-    If earlier lines are no longer kept, the first line has their number.
+    If the journal has dropped earlier lines, the first line of the text tells how many.
     """
     written = [line_text(line) for line in lines]
     if missing := missing_of(lines):
@@ -236,7 +236,7 @@ class BenchOperator(Operator):
         self._assembly, self._wires = assembly, faults.wires
 
     def full_name_of(self, name: str) -> str:
-        """Return the full name of a fault; the given name may have its device or wire in front."""
+        """Return the full name of a fault from its name, with or without its device or wire."""
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
         return bare if owned and name not in self.faults and bare in self.faults else name
@@ -253,8 +253,8 @@ class Parts:
         mounts: wires with their devices.
         bodies: mechanical bodies that drives move; each body is also a device `body`.
         start: initial values of inputs, by device and name.
-        signals: values that change with time. The key is `DEVICE/INPUT`, or the name that formulas
-            use.
+        signals: values that change with time. The key is the input that the signal drives, as
+            `DEVICE/INPUT`, or a name that formulas use.
         stores: files with stored parameters of nodes, which are saved while time passes.
         seed: seed of all random numbers.
     """
@@ -344,7 +344,7 @@ class RigState(Copyable):
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def draw_by(self, seed: int) -> None:
-        """Set new seeds for the random faults that start from now on, different for each wire."""
+        """Give each wire a new, different seed for the random faults that start from now on."""
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 
@@ -352,8 +352,8 @@ class RigState(Copyable):
         """Return the full name of a fault, which is unique on the bench.
 
         Args:
-            owner: name of the device that has the fault or whose wire has it, or of the wire
-                itself. An empty name stands for any of these.
+            owner: name of a device or wire. For a device, the fault may belong to the device or to
+                its wire. If the name is empty, any device and wire is searched.
             fault: short name of the fault.
 
         Raises:
@@ -377,8 +377,8 @@ class RigState(Copyable):
             owner: name of the device or wire, or empty for the whole bench.
 
         Returns:
-            Full names of the faults, which are unique on the bench, by the short names for this
-            owner.
+            The faults, as a mapping from short names to full names. A short name is unique for this
+            owner, and a full name is unique on the bench.
         """
         everything = self.operator.faults
         if not owner:

@@ -34,7 +34,8 @@ class BenchBlocked(BenchError):  # noqa: N818 - no error of the device
 class MachineTooSlow(BenchBlocked):
     """Raised if the machine was too slow to keep real time.
 
-    Delays in the test may then come from the machine, not from the device, so there is no verdict.
+    In this case a delay in the test may come from the machine instead of the device. Therefore the
+    test has no verdict.
     """
 
     __module__ = "tickrig"

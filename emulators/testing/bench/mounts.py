@@ -39,7 +39,8 @@ class LineMount(Copyable):
         line: the line.
         devices: devices by name.
         entries: description of each device for the header of a trace, by name of the device.
-        tap: traffic at the end of the first device, after faults of the line.
+        tap: traffic as the first device sends and receives it, that is, changed by faults of the
+            line.
     """
 
     def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:
@@ -107,8 +108,8 @@ class LineMount(Copyable):
 class BusMount(Copyable):
     """A CAN bus of a bench with its CANopen nodes.
 
-    A further end of the bus acknowledges frames. A node is therefore never alone on the bus, even
-    without a host.
+    The bus has an additional end that acknowledges all frames. Therefore a node can send even if
+    there is no host and no other node on the bus.
 
     Args:
         name: name of the bus.

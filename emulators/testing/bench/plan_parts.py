@@ -61,8 +61,8 @@ def parts_of(plan: RigPlan) -> Parts:
     """Make the devices of a rig file, and put them on their wires.
 
     Raises:
-        ValueError: a device cannot be made, for example because its EDS is unreadable; or a device
-            type does not know an option, or a signal is invalid.
+        ValueError: a device cannot be made, for example because its EDS is unreadable. The same
+            error is raised if a device type does not know an option, or a signal is invalid.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, late.StoreFile] = {}
@@ -251,7 +251,7 @@ def mounts_of(
     line: LineSettings | None = None,
     sdo_timeout_us: int | None = None,
 ) -> list[Mount]:
-    """Make the devices of a bench, each serial device on its own line, all nodes on one CAN bus.
+    """Make the devices of a bench, and a line for each serial device or one CAN bus for all nodes.
 
     Args:
         devices: devices, device types or names of device types, by name of the device.
@@ -262,8 +262,8 @@ def mounts_of(
             the nodes.
 
     Raises:
-        ValueError: an object is neither a device nor a device type; or the time-out is 0, or there
-            is a time-out but no node.
+        ValueError: an object is neither a device nor a device type, or the time-out is 0. A
+            time-out without any node raises this error, too.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -300,7 +300,7 @@ def _set_timeout(slave: CanopenSlave, sdo_timeout_us: int | None) -> None:
 
 
 def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
-    """Return the device that a text names, as the key `type` of a rig file would.
+    """Return the device that a text names in the notation of the key `type` of a rig file.
 
     Args:
         text: name of a device type, or file of the device. A CANopen device may have its node-ID in

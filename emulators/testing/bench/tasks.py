@@ -82,7 +82,8 @@ def check_condition(condition: object) -> None:
 def text_of(condition: Condition) -> str:
     """Return a description of a condition for messages.
 
-    It is the line that the condition waits for, or file and line number of its function.
+    The text is the line that the condition waits for, or the file and line number of the function
+    that checks the condition.
     """
     if isinstance(condition, LineTrigger):
         return str(condition)
@@ -103,12 +104,13 @@ def _ordinal(number: int) -> str:
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
-    """Call a function once, as soon as a condition is true: now, or after a later step of the rig.
+    """Call a function once, when a condition is true for the first time.
 
     Args:
         rig: rig of the bench.
         condition: function that returns whether the condition is true.
-        act: function to call. The call is between two ticks.
+        act: function to call. It is called at once if the condition is already true, otherwise
+            after a later step of the rig, between two ticks.
     """
 
     def watch(now_us: int) -> None:
@@ -171,7 +173,8 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
     """Run the coroutine of an async test, and advance the time of the bench while it waits.
 
     Raises:
-        TypeError: the coroutine awaits something else, such as `asyncio.sleep`.
+        TypeError: the coroutine awaits an object that the bench cannot wait for, such as
+            `asyncio.sleep`.
         RuntimeError: an awaited condition does not become true within a day of virtual time, or can
             never become true.
         HostHangsError: the limit for waits is reached.

@@ -27,7 +27,8 @@ class CampaignJournal:
 
     Args:
         path: path of the file.
-        head: properties of the campaign, by name. A file with other properties is refused.
+        head: properties of the campaign, by name. If the file was written by a campaign with other
+            properties, it is refused.
 
     Attributes:
         verdicts: verdicts read from the file and added later, by number of the run.

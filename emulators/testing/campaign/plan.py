@@ -144,7 +144,7 @@ class CampaignPlan:
     def numbers(self) -> Iterator[int]:
         """Yield the numbers of the runs that this part of the campaign does, in ascending order.
 
-        Every part has runs of every test.
+        The runs are spread so that each part of the campaign runs each test.
         """
         tests, (part, parts) = len(self.collected.tests), self.shard
         for index in range(len(self.seeds)):

@@ -161,7 +161,7 @@ def _rows(
 
 
 def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
-    """Merge the tables of the parts of a campaign; a run that is in several tables counts once.
+    """Merge the tables of the parts of a campaign. A run in several tables is counted once.
 
     Raises:
         Refusal: the columns of the tables differ, or a run ended differently in two tables.

@@ -67,7 +67,7 @@ class _Worker:
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Replace pytest's terminal reporter by one without output, in a worker process.
+        """Replace pytest's terminal reporter in a worker process by one that prints nothing.
 
         There must be a reporter, because pytest up to 9.0 needs it to explain what `assert`
         compared.

@@ -139,7 +139,7 @@ class _FrameTranscript(Transcript):
         super().__init__(emulator, write, lambda line: False)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send a frame of a host; the log shows it when the emulated bus has transmitted it."""
+        """Send a frame as a host; the log shows the frame once it was transmitted on the bus."""
         self._emulator.send(now_us, data)
 
 
@@ -326,7 +326,8 @@ def read_rig(path: Path) -> _RigNodes:
     """Read the CANopen nodes of a rig file, and the mechanical body that their drives move.
 
     Raises:
-        Refused: the file cannot be read, has errors, or has more than nodes on one bus.
+        Refused: the file cannot be read or has errors. The same exception is raised if the file has
+            several buses, or contents other than CANopen nodes.
     """
     try:
         if is_bus_file(path.read_bytes()):

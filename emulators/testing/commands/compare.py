@@ -345,7 +345,8 @@ def report(
 
     Args:
         file: name of the trace.
-        pairs: recorded lines with the corresponding lines of the emulator, by name of the device.
+        pairs: pairs of a recorded line and the corresponding line of the emulator, by name of the
+            device.
         tolerance_us: tolerance of the times in microseconds.
         everything: whether equal lines are listed, too.
     """

@@ -83,8 +83,8 @@ class _Signals:
                 device has this signal.
 
         Raises:
-            ValueError: no signal or several signals have the name, or the value of the signal is a
-                text.
+            ValueError: the word fits no signal, or it fits several signals, or the value of the
+                signal is a text.
         """
         names = dict.fromkeys((*self.outputs, *self.inputs.table))
         lone = next(iter(self._assembly.parts)) if len(self._assembly.parts) == 1 else ""

@@ -174,8 +174,8 @@ def bench_source(
         device: name of the device whose bus is used, or empty for any.
 
     Raises:
-        ValueError: the bench is not in virtual time, or has no CANopen node with the node-ID, or
-            has several such nodes on different buses; or the device is not a CANopen node.
+        ValueError: the bench is not in virtual time, no CANopen node has the node-ID, or nodes on
+            different buses have it. The same error is raised if `device` is not a CANopen node.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")

@@ -26,8 +26,8 @@ _Entry = tuple[int, int, _Call]
 class DurandSlave:
     """A `durand.Node` as a slave for the conformance tester, with virtual network and time.
 
-    durand has one scheduler for the whole process. It is replaced by the scheduler of this object
-    while the node is called, and then restored.
+    durand has one scheduler for the whole process. While the node is called, the scheduler of this
+    object takes its place. Afterwards durand's own scheduler is restored.
 
     Args:
         make: function that makes the node on a network. It is called again at each power-on.

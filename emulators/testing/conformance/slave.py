@@ -21,8 +21,9 @@ TICK_US: Final = 1_000
 class Slave(Protocol):
     """Protocol of a CANopen slave under test: `tick` gets the time and frames, and returns frames.
 
-    The slaves of `tickrig.device` have this interface. Your own slave has it, too, if it gets the
-    time as an argument and reports when it must be called next. It may wrap a C library.
+    The slaves of `tickrig.device` have this interface. To test your own slave, write a class with
+    this interface. The class gets the time as an argument and reports when it must be called next,
+    and it may wrap a C library.
     """
 
     @property
@@ -120,7 +121,8 @@ class CalledSlave:
 def is_step(node: object) -> bool:
     """Return whether an object is itself the function to call each millisecond.
 
-    `CalledSlave` refuses such an object, because it needs a function that makes it.
+    `CalledSlave` refuses such an object, because it needs a function that makes a new object at
+    each power-on.
     """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 
@@ -197,7 +199,7 @@ _OURS: Final = "tickrig."
 
 
 class Crashes:
-    """Collects the exceptions of a tested program until a callback is set, which then gets them.
+    """Collects the exceptions of a tested program until a callback is set that receives them.
 
     Args:
         who: owner of the program, for messages, such as `your slave`.

@@ -90,7 +90,7 @@ class _BenchLoop(asyncio.SelectorEventLoop):
 def bench_loops(passing: Passing) -> Iterator[None]:
     """Make asyncio create event loops that use the virtual time of a rig, during a `with` block.
 
-    So a host may call `asyncio.run`.
+    Therefore a host may call `asyncio.run`, and its waits take virtual time.
 
     Args:
         passing: object that advances the time when a loop waits. Only loops of the calling thread

@@ -37,7 +37,7 @@ class UnpatchedTimeError(HostTimeError):
 class HostHangsError(AssertionError):
     """Raised if a host does not return, because it waits longer than the bench allows.
 
-    In a search for failures, the limit is that of the `BenchMachine`.
+    In a search for failures, the `BenchMachine` sets this limit.
     """
 
     __module__ = "tickrig"
@@ -99,7 +99,7 @@ def place_of(file: str, line: int) -> str:
 def host_places(frame: FrameType | None) -> list[str]:
     """Return the lines of host code in the call stack of a frame, from innermost to outermost.
 
-    The outermost is in the test.
+    The last line in the result is a line of the test.
     """
     places: list[str] = []
     while frame is not None:
@@ -335,7 +335,7 @@ class Patches:
 
     The functions are replaced in their modules and classes, and wherever a host's module has stored
     them: by `from time import sleep`, as an attribute of a class, or as the default of an argument.
-    A function that was already replaced by another patch gets that patch back at the end.
+    If another patch had already replaced a function, the function has that patch again at the end.
 
     Args:
         acts: replacements for hosts, by owner and name of the function.

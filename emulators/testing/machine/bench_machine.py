@@ -36,8 +36,8 @@ class World:
         bench: the bench, in virtual time.
         faults: names of the faults that may occur, with or without arguments. The default is all
             faults.
-        inputs: names of the inputs that may change. The default is all inputs except objects of
-            nodes.
+        inputs: names of the inputs that may change. The default is all inputs, except the objects
+            of CANopen nodes.
 
     Attributes:
         faults: faults that may occur, by name and arguments.

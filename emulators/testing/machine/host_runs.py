@@ -207,7 +207,7 @@ def check_written(rule: str, name: str, value: object, listed: object = None) ->
         rule: name of the rule.
         name: name of the argument.
         value: value of the argument.
-        listed: values that the rule lists, or None if the rule lists no values.
+        listed: values that the rule allows for the argument, or None if the rule has no such list.
     """
     try:
         node = ast.parse(_literal(value), mode="eval").body
@@ -346,7 +346,7 @@ class HostRuns:
         self._stack.close()
 
     def run(self, steps: Sequence[HostStep]) -> None:
-        """Restore the snapshot of the bench and execute steps; raise an exception of the host.
+        """Restore the snapshot of the bench, and execute the steps of a run.
 
         Raises:
             HostHangsError: the host waits without end.

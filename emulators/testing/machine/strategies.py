@@ -74,8 +74,8 @@ def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrat
 
     Args:
         bench: the bench with the inputs.
-        names: names of the inputs and buttons to draw from. The default is all of the bench except
-            the objects of nodes.
+        names: names of the inputs and buttons to draw from. The default is all inputs and buttons
+            of the bench, except the objects of CANopen nodes.
 
     Raises:
         ValueError: an input is unknown.

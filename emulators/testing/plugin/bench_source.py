@@ -88,13 +88,13 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return the same request with the devices made for this test, and with complete paths.
+        """Return a copy of this request that has its own devices for the test, and complete paths.
 
         Args:
             item: the test.
 
         Raises:
-            ValueError: there is no device, or another test has used the devices.
+            ValueError: the request names no device, or another test has already used the devices.
         """
         source = _fresh(item, self.source)
         made = source() if callable(source) else source
@@ -139,7 +139,7 @@ class WantedBench(NamedTuple):
 
     @property
     def safe(self) -> Mapping[str, Mapping[str, Setting]]:
-        """Values that the rig file requires of outputs after a test, by device and output."""
+        """Values that the rig file demands for outputs after a test, by device and output."""
         return plan_of(self.source).safe if isinstance(self.source, Path) else {}
 
     @property
@@ -215,7 +215,7 @@ def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
 
 
 def allowed_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return what the markers `allows` of a test allow, as names.
+    """Return the names that a test gives to its markers `allows`, such as `LOST`.
 
     Raises:
         ValueError: a name is unknown.
@@ -228,7 +228,7 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return what the markers `needs` of a test require of its bench, as names in their order.
+    """Return the names that a test gives to its markers `needs`, in their order.
 
     Raises:
         ValueError: a name is unknown.
@@ -343,9 +343,9 @@ def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
     """Run the warm-up of a test on its bench, and return the bench for the test.
 
     In virtual time the returned bench may be a copy of one on which the warm-up ran for an earlier
-    test. A copy is used only if the result is the same: the bench before the warm-up must be equal
-    except for its seed, and the warm-up must not have drawn random numbers. Hosts, triggers and
-    tasks of the warm-up are removed.
+    test. A copy is used only if the warm-up would have the same result on a new bench. Therefore
+    both benches must be equal before the warm-up, except for the seed, and the warm-up must not
+    have drawn random numbers. Hosts, triggers and tasks of the warm-up are removed.
 
     Raises:
         ValueError: the bench cannot be copied after the warm-up, although it could be copied

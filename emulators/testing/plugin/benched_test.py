@@ -266,7 +266,7 @@ def benched(
 def clocked(bench: Bench) -> Iterator[Any]:
     """Run a test with the clock of its bench in place of the machine's.
 
-    If a host waits where it cannot wait, such as in a callback, the test fails.
+    The test fails if a host waits at a place where waiting is impossible, such as in a callback.
     """
     try:
         with bench.patched_time() as clock:

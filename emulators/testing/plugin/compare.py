@@ -26,7 +26,7 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 class Fingerprint:
     """Records everything that happens on a bench, in order to compare two runs of a test.
 
-    These are the traffic, and the changes of signals.
+    The traffic and all changes of signals are recorded.
 
     Args:
         rig: the rig of the bench.

@@ -147,9 +147,9 @@ SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
 def with_plan(
     safe: SafeState, plan: Mapping[str, Mapping[str, Setting]], bench: Bench
 ) -> SafeState:
-    """Return the required values of outputs after a test, from fixture and rig file together.
+    """Return the values that outputs must have after a test, from a fixture and the rig file.
 
-    Values of the fixture have priority.
+    If both give a value for an output, the value of the fixture is used.
 
     Args:
         safe: required values of the fixture, or its check.
@@ -182,7 +182,7 @@ def _short(name: str, bench: Bench) -> str:
 
 
 def check_safe(bench: Bench, safe: SafeState) -> None:
-    """Raise ValueError if a value is required of an output that the bench does not have."""
+    """Raise ValueError if the table of required values names an output that the bench lacks."""
     for name in safe if isinstance(safe, Mapping) and bench.mode != HARDWARE else ():
         bench.get(name)
 
@@ -211,11 +211,11 @@ THREADS: Final = "threads"
 
 @contextmanager
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
-    """Record threads that start during the test and end with an exception, in a `with` block.
+    """Record threads that start in the `with` block of a test and end with an exception.
 
-    Name, line and exception are recorded. For threads that started before the test, only pytest's
-    warning appears, which covers all threads. A thread that ends by `sys.exit()` is recorded only
-    if its exit status is an error.
+    The record has the name of the thread, the line and the exception. Threads that started before
+    the test are not recorded, but pytest warns about them as about all threads. A thread that ends
+    by `sys.exit()` is recorded only if its exit status is an error.
 
     Args:
         note: function that is called with a line of text, in the thread that ends.
@@ -272,7 +272,7 @@ _TOLD: Final = re.compile(r"coroutine '(.*)' was never awaited(?s:.*)  File \"(.
 def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
     """Record coroutines that are discarded without being awaited, during a `with` block.
 
-    They are recorded regardless of warning filters.
+    Filters of warnings have no effect on the record.
 
     Args:
         note: function that is called with a line of text for each coroutine.

@@ -66,9 +66,10 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
 
 
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
-    """Yield the lines of a bench's journal, each with its text; a CAN frame is decoded.
+    """Yield each line of a bench's journal and its text, in which a CAN frame is decoded.
 
-    PDOs are decoded even if their mapping was written before the first kept line.
+    PDOs are decoded with their mapping, even if the host wrote the mapping so early that the
+    journal no longer has this line.
     """
     meanings, buses = decoder.Decoder(), buses_of(bench)
     for line in bench._mode.mappings():

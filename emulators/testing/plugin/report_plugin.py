@@ -47,7 +47,8 @@ class ReportPlugin:
 
     Raises:
         OSError: the file with the requirements cannot be read.
-        ValueError: the file has errors, or the report could not be written.
+        ValueError: the file with the requirements has errors, or the path of the report is not
+            suitable.
     """
 
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:

@@ -47,9 +47,9 @@ def blocked(
     *,
     mistaken: bool = False,
 ) -> str:
-    """Return why a phase of a test gave no verdict about the device, or "" if it gave one.
+    """Return the reason if a phase of a test gave no verdict about the device, otherwise "".
 
-    An example is a machine that was too slow.
+    For example, there is no verdict if the machine was too slow.
 
     Args:
         report: report of the phase.
@@ -96,9 +96,9 @@ def _raiser(error: BaseException) -> str:
 def end_at_caller(error: BaseException) -> None:
     """Shorten a traceback, so that it ends at the line of the user that called tickrig.
 
-    That is done if tickrig has refused a call, or if a host waits endlessly. If a function of the
-    user that tickrig has called raises, such as a condition, tickrig's frames between the test and
-    this function are removed.
+    The traceback is shortened if tickrig has refused a call, or if a host waits endlessly. The
+    exception may also come from a function of the user that tickrig has called, such as a
+    condition. Then only tickrig's frames between the test and this function are removed.
 
     Args:
         error: the exception of the test.
@@ -143,9 +143,9 @@ def _package_of(entry: TracebackType) -> str:
 
 
 def make_error(report: pytest.TestReport, reason: str) -> None:
-    """Turn the report of a failed test into an error with a problem of the bench as its reason.
+    """Change the report of a failed test to an error, whose reason is a problem of the bench.
 
-    An expected failure becomes an error, too.
+    A test that was expected to fail (`xfail`) becomes an error, too.
 
     Args:
         report: report of the test.

@@ -286,7 +286,7 @@ _KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True
 
 
 class DeviceChecks:
-    """Property-based checks of one device type; each check runs a session of host and environment.
+    """Property-based checks of one device type, on which a host and the environment act.
 
     Args:
         bench: function that makes a bench with one device.

@@ -30,7 +30,7 @@ Observation = tuple[Any, ...]
 class DeviceBench:
     """A device on a wire with a host that plays a session, for the property-based checks.
 
-    Everything that the host and the outputs of the device show is recorded.
+    The object records all data that the host receives, and all changes of the device's outputs.
 
     Attributes:
         make: function that makes the device.
@@ -175,7 +175,7 @@ def difference(
         device: the device with the outputs.
         one: observations of one run.
         other: observations of the other run.
-        first: description of the first run, which is written after its value.
+        first: description of the first run. In the text it follows the value of this run.
         second: description of the other run.
     """
     names = [_SENDS, *getattr(device, "outputs", ())]

@@ -78,7 +78,7 @@ def _remote(can_id: int, extended: bool, length: int) -> CanFrame:
 def waits(tick_us: int) -> st.SearchStrategy[int]:
     """Return a Hypothesis strategy for the duration of a wait in microseconds.
 
-    Durations are near multiples of the tick, and up to seconds.
+    Most durations are near a multiple of the tick. The longest are some seconds.
 
     Args:
         tick_us: period of the device in microseconds.

@@ -46,7 +46,7 @@ class Outcome(StrEnum):
 class RunEnvironment:
     """Environment and settings of a test run, for a bench report.
 
-    They are equal for all workers of a parallel run.
+    All workers of a parallel run have the same environment and settings.
 
     Attributes:
         date: start of the run, as text.
@@ -99,8 +99,9 @@ class PlannedFault:
         name: name as in the request, with device and rate: `left_drive/flip=0.01`.
         from_us: time at which the fault began, or None if its trigger did not occur.
         to_us: time at which the fault ended, or None if the fault stayed.
-        when: trigger of the fault, such as `the 3rd OK:output`, or its start time if that was not
-            reached. The text is empty if the fault began at its time.
+        when: trigger of the fault, such as `the 3rd OK:output`. If a fault with a start time has
+            not begun, this text is the start time. The text is empty if the fault began at its
+            time.
         ordered_us: time at which the fault was requested, or None if unknown, as for a manual
             fault.
     """
@@ -275,9 +276,9 @@ _GROUP: Final = 4
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
     """Return a curve with at most `most` samples, which keeps the extremes of the curve.
 
-    The first and the last sample are kept. Of every four other samples, the two extremes are kept,
-    or the first and the last if one of the four is a word. This is repeated while there are too
-    many samples.
+    The first and the last sample are kept. Of each group of four other samples, the smallest and
+    the largest are kept. If a sample of the group is a word, the first and the last sample are kept
+    instead. This is repeated while there are too many samples.
 
     Args:
         points: samples in order of time.

@@ -193,7 +193,7 @@ class PagePath:
 
     @property
     def drawn(self) -> tuple[float, float, str]:
-        """Width and height of the diagram, and its curve as an SVG path.
+        """Width and height of the diagram, followed by the curve as an SVG path.
 
         If both signals have the same unit, both axes have the same scale.
         """

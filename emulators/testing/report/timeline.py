@@ -89,7 +89,8 @@ class Lane:
         name: name of the signal.
         unit: unit of the numbers.
         path: curve of the signal as an SVG path, or empty for words.
-        words: values of the signal if they are words, or its only number.
+        words: values of the signal if its values are words. If the signal has the same number all
+            the time, this number is the only word.
         low: least number.
         high: greatest number.
         scale: numbers at the lower and the upper edge of the diagram.

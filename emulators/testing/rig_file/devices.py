@@ -190,7 +190,7 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits | None:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return what the key `type` of a device names: built-in type, EDS, model or Python code.
+    """Return whether a device's key `type` names a built-in type, an EDS, a model or Python code.
 
     Args:
         text: type as in the rig file.
@@ -199,7 +199,8 @@ def kind_of(
             built in.
 
     Returns:
-        The kind of source that the type names, and the type with a path that can be opened.
+        The kind of source, and the text of `type`. If the text is a file name, the folder is put in
+        front, so that the file can be opened.
 
     Raises:
         ValueError: no such type or file exists.
@@ -292,7 +293,8 @@ _TOLERANCE_TABLE = "tolerance"
 class DoorReader:
     """Reads the tables `[real]` and `[hardware]` of a rig file.
 
-    They have the addresses for hosts in real time, and those of real devices.
+    The table `[real]` has the addresses at which hosts find the emulated wires in real time. The
+    table `[hardware]` has the addresses of real devices.
 
     Args:
         wires: wires by name. The value is None for a wire of unknown type.

@@ -70,7 +70,7 @@ class WirePlan:
     def frame_bits(self) -> int:
         """Number of bits of one character on the line, including start, parity and stop bits.
 
-        Half a stop bit counts as a whole one.
+        With 1.5 stop bits, two stop bits are counted.
 
         >>> WirePlan(name="line", framing="7E2").frame_bits
         11
@@ -96,8 +96,8 @@ class MadeDevice:
 
     Args:
         device: a device made by `configure`, or a slave.
-        of: parameters with which the device was made. A bench with other parameters does not use
-            it.
+        of: parameters with which the device was made. The device is not used by a bench that has
+            other parameters.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:

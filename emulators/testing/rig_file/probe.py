@@ -32,11 +32,11 @@ from tickrig.host.text.values import Setting
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Properties of a device with which its settings in a rig file are checked.
+    """Properties of a device that are needed to check its settings in a rig file.
 
     Attributes:
         physical: inputs and outputs of the device.
-        wire_faults: faults of the device's end of the wire, or of its bus.
+        wire_faults: faults of the wire at the end of the device, or faults of the CAN bus.
         title: name of the device in messages.
         baud: baud rate of the type of a serial device.
         node_id: node-ID of a CANopen node, from its DCF or model.
@@ -81,14 +81,14 @@ class WrongDevice(NamedTuple):
 
 
 def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
-    """Make a device of a rig file on trial, and return what is needed to check the file.
+    """Make a device of a rig file, in order to find errors in the file before it is used.
 
     Args:
         plan: description of the device in the rig file.
         seed: seed of all random numbers, for a device on a serial line.
 
     Returns:
-        The properties of the device, or all errors.
+        The properties of the device, or all errors in its description.
     """
     if plan.kind is DeviceKind.SERIAL:
         return _serial(plan, seed)
@@ -247,7 +247,8 @@ _UNREAD = SignalSpec(Constant(0.0))
 class StartReader:
     """Reads from a rig file the initial values of inputs and the signals that drive inputs.
 
-    They are checked together, because a formula may name signals of other tables.
+    All tables with such values are checked together, because a formula in one table may name
+    signals of another table.
 
     Args:
         folder: folder of the files with tables of values.

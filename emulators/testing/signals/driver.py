@@ -71,9 +71,9 @@ class _SignalScope:
         self.signals, self.devices = signals, devices
 
     def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
-        """Return what a name in a formula stands for, or None if it is unknown.
+        """Return the signal, input or output that a name in a formula means, or None if unknown.
 
-        It is the name of a signal, or an input or output of a device.
+        A signal is returned as its name. Otherwise the result is an input or output of a device.
 
         Args:
             name: name as in a formula: a signal, an input or output of the owner's device,
@@ -499,7 +499,7 @@ class _Target(Copyable):
         self._value: Setting | None = None
 
     def take(self, value: Setting) -> str:
-        """Set the driven input to a value if its value differs; return an error message, or ""."""
+        """Set the driven input to a new value; return an error message, or "" if there is none."""
         if not isinstance(value, str):
             value = min(max(value, self._item.low), self._item.high)
             if not isfinite(value):

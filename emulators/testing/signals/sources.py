@@ -117,7 +117,7 @@ class Wave(Immutable):
         first: the first limit.
         second: the second limit.
         period_us: duration of a period in microseconds.
-        phase_us: time by which the wave is ahead, in microseconds.
+        phase_us: time in microseconds by which the wave is shifted towards earlier times.
         duty: part of a period in which a square has the second value, above 0 and below 1.
     """
 
@@ -256,7 +256,7 @@ _SETTLED: Final = 1e-9
 class Lag(Immutable):
     """A signal that follows a formula with a first-order lag.
 
-    After a step of the formula it covers 63 % of the distance in `tau_us`.
+    If the value of the formula jumps, the signal covers 63 % of the jump within `tau_us`.
 
     Attributes:
         formula: formula whose value the signal follows.

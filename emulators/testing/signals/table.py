@@ -197,7 +197,7 @@ _INTERPOLATIONS: Final = ("linear", "hold")
 
 
 def read_table(folder: Path, fields: Mapping[str, Any]) -> ValueTable:
-    """Make a signal that follows a table, from the keys of its description in a rig file.
+    """Make a signal that follows a table of times and values, as a rig file describes it.
 
     Args:
         folder: folder of the files.

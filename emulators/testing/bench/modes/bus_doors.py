@@ -117,7 +117,7 @@ def _name_of(plan: BusPlan) -> str:
 
 
 def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
-    """Return a link of a host to a python-can bus, without the frames that the link itself sends.
+    """Return a link of a host to a python-can bus. The link does not receive its own frames.
 
     Raises:
         BusGone: the bus cannot be opened.

@@ -173,7 +173,7 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Note that frames are recorded, so that other connections of the bus do not record them.
+        """Note that a connection has recorded frames, so that no other connection records them.
 
         Args:
             wire: name of the bus.

@@ -30,7 +30,7 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Measures how late a host's waits at its connection to a bench were.
+    """Measures the delays of a host: how much too late its waits at a connection ended.
 
     Subclasses override `passed` to get the traffic of the connection.
 
@@ -64,11 +64,11 @@ class HostPace:
 
 
 class LinkGone(PortGone, LinkClosed):
-    """Raised by a link whose port is gone. It is a `LinkClosed`, so hosts can handle it as such."""
+    """Raised by a link whose port is gone; hosts that handle `LinkClosed` handle this, too."""
 
 
 class WatchedLink(Generic[W]):
-    """Wrapper of a host's `Link` that reports its traffic to a monitor, and how long waits took.
+    """Wrapper of a host's `Link` that reports the traffic and the waits of the host to a monitor.
 
     Args:
         link: the wrapped link.
@@ -285,7 +285,7 @@ class CpuWaits:
     def look(self, now_us: int) -> None:
         """Update `worst_us` with the waits of all threads, unless the last update is recent.
 
-        If the last update is too long ago, the waits since then are ignored.
+        If the last update is too long ago, the waits since that update are ignored.
 
         Args:
             now_us: present time in microseconds.

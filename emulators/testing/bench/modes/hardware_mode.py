@@ -59,8 +59,8 @@ class HardwareMode(BenchMode):
     """Mode of a bench whose devices are real, as described in the rig file.
 
     Each device is at a port or on a bus, and a human at the terminal operates it. If an emulator
-    stands in for a device, the bench operates the emulator by its control socket. Conditions are
-    checked on all traffic, and while the bench waits.
+    stands in for a device, the bench operates the emulator by its control socket. The bench checks
+    conditions whenever there is traffic, and also while the bench waits.
 
     Args:
         plan: content of a rig file with the section `[hardware]`.
@@ -180,8 +180,8 @@ class HardwareMode(BenchMode):
     def too_slow(self) -> str:
         """Return why the verdict of a failed test is not valid, or "" if the verdict is valid.
 
-        A verdict is not valid if the host or an emulator was too late. It is always valid if a
-        human has answered no.
+        A verdict is not valid if the host or an emulator was too late. But if a human has answered
+        no to a question, the verdict is always valid.
         """
         if self._operators.said_no:
             return ""

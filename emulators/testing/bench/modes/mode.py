@@ -229,10 +229,10 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return why the verdict of a failed test is not valid, or "" if real time was kept."""
+        """Return a reason if a failed test is not valid, because the bench was too slow, or ""."""
 
     def hung(self) -> str:
-        """Return the error message of a host that has waited endlessly, or "" if none has."""
+        """Return an error message if a host has waited endlessly, otherwise ""."""
         return ""
 
     @abstractmethod

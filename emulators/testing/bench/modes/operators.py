@@ -86,8 +86,8 @@ _DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 class Terminal:
     """Asks a human at the terminal, even if standard input and output are redirected.
 
-    So it works although pytest captures both. Hosts keep running while the terminal waits for an
-    answer.
+    Therefore a question reaches the human although pytest captures input and output. Hosts keep
+    running while the human is asked.
 
     Args:
         path: path of the terminal device.
@@ -211,7 +211,8 @@ class _HumanOperator:
     def get(self, name: str) -> Setting:
         """Return the value of an input or output of a real device.
 
-        For an input it is the value that was last set. For an output the human is asked.
+        The value of an input is the value that was last set. The value of an output is asked from
+        the human.
         """
         if name in self._physical.inputs.table:
             return self._physical.inputs[name]
@@ -348,8 +349,8 @@ class _EmulatorOperator:
     def prepare(self, like: HasSignals) -> None:
         """Prepare the device for a test: clear all faults, and reset all inputs.
 
-        The inputs get their initial values. The power of the device is then off. Its physical state
-        stays, such as the position of a drive.
+        The inputs get their initial values, and the device is switched off. The physical state of
+        the device stays as it is, for example the position of a drive.
 
         Args:
             like: equivalent emulated device, which has the initial values.
@@ -582,8 +583,9 @@ class Operators:
         Args:
             owner: name of the device or wire with the fault, or empty if the fault may belong to
                 any.
-            order: requested fault, whose name is replaced by its full name. If the fault has a
-                condition, the operator must be an emulator, because a human is too slow.
+            order: requested fault. Its short name is replaced by the full name. A human is too slow
+                for a fault that begins when a condition is true, so such a fault needs an emulator
+                as the operator.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -622,7 +624,7 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Ask a human whether something is observed; return the answer, or None without a human.
+        """Ask a human whether something is observed; return the answer, or None without human.
 
         Args:
             owner: name of the device whose operator is asked, or empty for the first device with a

@@ -283,7 +283,7 @@ class RealMode(EmulatedMode):
         Args:
             mounts: the wires with their devices.
             plan: settings of the rig file for real time.
-            rig_at: function that makes the rig, with the clock and the bridges of the connections.
+            rig_at: function that makes the rig from the clock and the bridges of the connections.
 
         Raises:
             PortGone: a bus cannot be opened.
@@ -372,7 +372,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return why the verdict of a failed test is not valid, or "" if real time was kept."""
+        """Return a reason if a failed test is not valid, because the bench was too slow, or ""."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us

@@ -170,8 +170,8 @@ class _WaitLimit(HostLimit):
 class RigPassing:
     """Advances the virtual time of a rig while a host waits in functions such as `time.sleep`.
 
-    It is a `Passing`. Functions that are called back in the middle of a step may read the clock,
-    but not wait.
+    The class implements the protocol `Passing`. A function that the rig calls in the middle of a
+    step may read the clock, but must not wait.
 
     Args:
         rig: rig that is advanced while a host waits.
@@ -414,7 +414,7 @@ class VirtualMode(EmulatedMode):
         return ""
 
     def hung(self) -> str:
-        """Return the error of a host that has waited endlessly; empty if there was none."""
+        """Return an error message if a host has waited endlessly, otherwise ""."""
         return self._limit.refused
 
     def fork(self) -> VirtualMode:
