@@ -18,7 +18,7 @@ def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
 
     Args:
         now_us: present time.
-        due_us: the earliest time of the tick, which may be `NEVER`.
+        due_us: earliest time of the tick, or `NEVER`.
         tick_us: period of the ticks.
 
     >>> next_tick_us(1_000, 0, 1_000), next_tick_us(1_000, 2_500, 1_000)

@@ -7,7 +7,7 @@ from tickrig._compiled import mypyc_attr
 
 @mypyc_attr(serializable=True)
 class LineSplitter:
-    r"""Splits a stream of received bytes into lines, however the bytes are divided into chunks.
+    r"""Splits a stream of received bytes into lines. The bytes may arrive in any chunks.
 
     Args:
         max_bytes: largest number of bytes of a line. A longer line is returned in pieces, so that

@@ -284,7 +284,8 @@ class PlacedPort:
     def subs(self) -> tuple[int, ...]:
         """Sub-indices of the object that contain the elements of the port's value.
 
-        They are 0 for a single element, or 1 and up for an array.
+        A value with one element has the sub-index 0. The elements of an array have the sub-indices
+        from 1 on.
         """
         length = self.profile.port_type.length
         return (0,) if length == 1 else tuple(range(1, length + 1))
@@ -434,7 +435,7 @@ _HEARTBEAT_MS: Final = 100
 
 
 def object_table(profile: RtcProfile) -> ObjectTable:
-    """Return the objects of a DeviceRTC: those of CiA 301, and from 2100h on one for each port."""
+    """Return the objects of a DeviceRTC: the objects of CiA 301, and an object for each port."""
     table = ObjectTable()
     communication = CommunicationProfile(
         device_type=_NO_PROFILE,

@@ -211,7 +211,7 @@ class Command:
     Attributes:
         symbol: symbol of two letters, such as `MD`.
         parameters: all parameters, one after the other.
-        string: string with its semicolon, or empty without a string.
+        string: text that the host adds, with its semicolon, or empty if there is no such text.
     """
 
     symbol: str

@@ -218,9 +218,9 @@ class RequestInbox:
         """Submit requests from any thread. The emulator answers them together, between two steps.
 
         Returns:
-            A future with the answers. It raises EmulatorEnded if the emulator ends before it
-            answers. The future is not cancelled in this case, because an event loop would then end
-            the task that waits for it.
+            A future with the answers. If the emulator ends before it answers, the future raises
+            EmulatorEnded. It is not cancelled, because an event loop would then end the task that
+            waits for the future.
         """
         from concurrent.futures import Future  # noqa: PLC0415 - slow
 

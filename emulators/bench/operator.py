@@ -294,7 +294,8 @@ class AssemblyFaults(Copyable):
             name: name of the fault in this rig.
 
         Returns:
-            The faults of the wire or the node, and the name that the fault has there.
+            The faults of the wire or the node that has the fault. The second value is the name of
+            the fault at this wire or node.
 
         Raises:
             KeyError: no fault has this name.
@@ -391,7 +392,8 @@ class Assembly(Copyable):
             name: name of the signal, with or without the prefix of its device.
 
         Returns:
-            The device, or None if there is none; and the name without the prefix.
+            The device, or None if no device has the signal. The second value is the name without
+            the prefix.
         """
         prefix, slash, rest = name.partition("/")
         if slash and (part := self.parts.get(prefix)):
@@ -529,8 +531,8 @@ class _FaultRow(NamedTuple):
 class Operator(Copyable):
     """Acts on an emulated device as a person would: sets inputs, presses buttons, starts faults.
 
-    An action between two ticks takes effect in the next tick, at `now_us` at the earliest. Each
-    press lasts for at least one tick.
+    An action takes effect in the next tick, but not before the time `now_us` of the action. Each
+    press of a button lasts for at least one tick.
 
     Args:
         inputs: the physical inputs of the device.
@@ -683,7 +685,7 @@ class Operator(Copyable):
     def full_name_of(self, name: str) -> str:
         """Return the name under which a fault is known here.
 
-        The prefix of a node is dropped if it is not needed, because the node is the only one.
+        If there is only one node, the prefix with the name of the node is removed.
         """
         bare = name.rpartition("/")[2]
         more = bare != name and name in self._wire.fault_types and name not in self.faults

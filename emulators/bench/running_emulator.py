@@ -28,10 +28,10 @@ _SWITCH_S: Final = 0.0005
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Context in which Python keeps real time better: threads switch more often.
+    """Context manager for programs in real time, in which Python switches threads more often.
 
-    Existing objects are excluded from the garbage collection ("frozen"), because collecting them
-    takes 50 ms.
+    Garbage collection skips all objects that exist already (they are "frozen"), because a
+    collection of all objects takes 50 ms.
     """
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)

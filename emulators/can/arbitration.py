@@ -47,10 +47,11 @@ class CanArbiter(ArbiterFields):
     All times are in the units of the segment.
 
     Attributes:
-        heads: a heap of whole numbers, which are sorted faster than tuples. The high bits are the
-            priority of the first frame of a queue, and the low bits are the number of the node.
+        heads: a heap with a whole number for each node that has frames to send. The high bits are
+            the priority of the first frame in the node's queue, and the low bits are the number of
+            the node.
         free: earliest time at which a frame can start.
-        slow: whether a node has to wait longer than until the bus is free.
+        slow: whether a node has to wait even if the bus is free.
     """
 
     __slots__ = ()
@@ -96,11 +97,12 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Choose the nodes that send next if some nodes may not send yet, and remove them.
+        """Remove and return the nodes that send next, while some other nodes may not send yet.
 
         Args:
-            everybody: whether to choose all nodes that may send at the start, not only those that
-                win the arbitration. This happens on a bus with a short circuit.
+            everybody: if true, all nodes that may send at the start of the frame are chosen,
+                because there is no arbitration on a bus with a short circuit. If false, only the
+                nodes that win the arbitration are chosen.
 
         Returns:
             The start of the next frame, and the nodes.

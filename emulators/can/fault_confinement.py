@@ -22,8 +22,8 @@ _BACK_FROM_PASSIVE: Final = 119
 class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
-    Not emulated: the additional 8 that a receiver adds to its error counter after a dominant bit
-    that follows its error flag, and the warning limit of 96, which is not a state.
+    Two rules are not emulated. A receiver does not add 8 to its error counter after a dominant bit
+    that follows its error flag. The warning limit of 96 does not exist, because it is not a state.
 
     Attributes:
         tec: transmit error counter.
@@ -97,7 +97,7 @@ class ErrorCounters(Part):
 class FaultConfinement(Part):
     """Updates the error counters and error states of all nodes of a bus.
 
-    Good frames need no counting while all counters are 0.
+    While all counters are 0, the bus need not count frames without errors.
 
     Args:
         ends: all ends of the bus.
@@ -172,7 +172,7 @@ _SEQUENCE_BITS: Final = 11
 
 
 class Recovery(Part):
-    """Recovery from bus-off: counts the recessive sequences for each node that waits.
+    """Recovery from bus-off: counts sequences of 11 recessive bits for each node that waits.
 
     Args:
         bit: length of a bit. All times in this class are in the same unit.
@@ -187,7 +187,7 @@ class Recovery(Part):
         self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
-        """Let a node in bus-off wait for its return.
+        """Let a node in bus-off wait until it may send again.
 
         If the node waits already, nothing happens.
         """
@@ -208,7 +208,7 @@ class Recovery(Part):
         )
 
     def interrupt(self, at: int, until: int) -> None:
-        """Account for a frame on the bus: count the recessive sequences before it.
+        """Count the sequences of recessive bits before a frame on the bus.
 
         The count continues after the frame, when the bus is recessive again.
 

@@ -127,8 +127,9 @@ class CanFaults(Copyable):
         Args:
             name: name of the fault.
             *arguments: texts after `NAME=`, split at commas.
-            number: number of the bus end whose frames alone the fault hits, for a fault in
-                `NARROWED`, or None for all frames of the bus.
+            number: number of a bus end. The fault then hits only frames from this end, which is
+                possible for the faults in `NARROWED`. With None the fault hits all frames of the
+                bus.
 
         Raises:
             KeyError: no fault has this name.
@@ -156,7 +157,7 @@ class CanFaults(Copyable):
         return self._tallies[key].acted if key in self._tallies else 0
 
     def judge(self, senders: Sequence[int]) -> FaultVerdict:
-        """Decide which fault, if any, hits the next frame on the bus.
+        """Decide whether a fault hits the next frame on the bus, and which fault.
 
         The decision for this frame stays the same until `spend` is called.
 

@@ -27,8 +27,8 @@ KEPT_SPANS: Final = 32_768
 class BusyTime(BusyFields):
     """Records when a bus was busy, to compute its load.
 
-    Consecutive frames are one span. Only the latest spans are kept. Times are whole numbers of any
-    unit.
+    Frames that follow each other without a gap are stored as one time span. Only the latest spans
+    are kept. Times are whole numbers in a unit that the caller chooses.
     """
 
     __slots__ = ()
@@ -115,8 +115,9 @@ class TransmissionOutcomes(SegmentFields):
     """The possible outcomes of a transmission on an emulated bus, each as a method.
 
     The methods deliver frames, and update queues and error counters of the nodes. `CanSegment`
-    plans the transmission and chooses the method for its outcome. A bit and a microsecond are whole
-    multiples of the unit of all times. Only time stamps are rounded, up to the next microsecond.
+    plans the transmission and chooses the method for its outcome. All times are counted in a unit
+    that is chosen so that a bit and a microsecond are whole numbers of units. Therefore only time
+    stamps are rounded, up to the next microsecond.
 
     Attributes:
         unit: number of units in a microsecond.

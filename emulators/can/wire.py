@@ -187,9 +187,9 @@ class CanWire(Copyable):
         end.segment.force_off(end, self.bus.now_us)
 
     def release(self, end: CanEnd) -> None:
-        """Let a node recover that `force_off` has put into bus-off.
+        """End the bus-off of a node that `force_off` has forced into bus-off.
 
-        From then on it recovers automatically, as with most drivers.
+        From then on the node recovers from bus-off automatically, as with most drivers.
 
         Args:
             end: the node's end.

@@ -44,7 +44,7 @@ class Described:
         name: prefix of the signals of the node, and key of its memory in a store file.
         node_id: node-ID 1..127, or `UNCONFIGURED`.
         description: description of the device in its file or model.
-        about: text about what the node moves, or empty if unknown.
+        about: text about the part of a robot that the node moves, or empty if unknown.
     """
 
     name: str

@@ -273,7 +273,7 @@ def _in_profile(
 
 
 def fitting(row: EntryDescription, value: int) -> Value:
-    """Return the value nearest to a number that the limits of an entry allow.
+    """Return a number, limited to the range of values that an entry allows.
 
     Args:
         row: description of the entry.
@@ -352,8 +352,8 @@ class EdsCache:
     """Cache of EDS and DCF files: reads each file once, and again when it has changed.
 
     Attributes:
-        others: other cached results, by their source, each with the versions of the files that it
-            depends on.
+        others: other cached results, by their source. Each result is stored with the versions of
+            the files from which it was made.
     """
 
     def __init__(self) -> None:

@@ -643,7 +643,7 @@ class NodeFaults(Copyable):
 
     @property
     def due_us(self) -> int:
-        """Time at which a fault next acts by itself, or at which a delayed frame is sent."""
+        """Time of the next event: a fault acts by itself, or a delayed frame is sent."""
         due_us = self._held[0][0] if self._held else NEVER
         return min([due_us, *(armed.next_us for armed in self._armed.values())])
 

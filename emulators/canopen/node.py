@@ -144,7 +144,7 @@ class Node(Copyable):
         return self.slave.on_accepts
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Notify the slave of a change in the CAN controller's error state, at its next tick.
+        """Tell the slave, in its next tick, the new error state of its CAN controller.
 
         Args:
             state: new state: error active, error passive or bus-off.
@@ -342,7 +342,7 @@ class _NodeInputs:
     def check(self, name: str, value: Setting) -> Setting:
         """Check whether `set` would accept a value, and return the value.
 
-        Some objects can refuse a value only when it is set.
+        For some objects the check is incomplete: they refuse a value only when it is set.
 
         Raises:
             ValueError: the input does not exist, or does not accept the value.

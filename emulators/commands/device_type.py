@@ -216,7 +216,7 @@ def option_names(name: str) -> tuple[str, ...]:
 def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]:
     """Make a new device with the settings of the device on which a trace was recorded.
 
-    A replay sends it the recorded input.
+    A replay sends the recorded input to this new device.
 
     Args:
         header: header of the trace.
@@ -233,7 +233,7 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
 
 
 def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
-    """Raise an error if a trace would make the replay run a Python file without permission.
+    """Raise ValueError if a replay of a trace would run a Python file without permission.
 
     Args:
         named: settings in the trace, of which one may name a Python file.

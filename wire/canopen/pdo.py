@@ -65,7 +65,7 @@ class MappedObject:
 
 
 def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
-    """Yield the objects of a PDO mapping, each with the number of bits before it in the PDO.
+    """Yield each object of a PDO mapping, with the number of bits that precede it in the PDO.
 
     Args:
         mapping: entries of the mapping parameter, such as 6040 0010h.
@@ -116,9 +116,10 @@ class PdoDescription:
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """An entry of an object scanner list, 1FA0h on: an object whose changes a node sends by MPDO.
+    """An entry of an object scanner list (from 1FA0h on). It names an object to send by MPDO.
 
-    The MPDO is in source address mode (SAM). See CiA 301, object scanner list.
+    The node sends an MPDO in source address mode (SAM) when the object changes. See CiA 301, object
+    scanner list.
 
     Attributes:
         index: index of the object.
@@ -143,10 +144,11 @@ class Scanned:
 
 @dataclass(frozen=True, slots=True)
 class Dispatched:
-    """An entry of an object dispatching list, 1FD0h on: where a node stores data of other nodes.
+    """An entry of an object dispatching list (from 1FD0h on), for data from another node.
 
-    The data arrive by MPDO in source address mode (SAM). The entry assigns an object of this node,
-    the consumer, to an object of the producer (CiA 301, object dispatching list).
+    The other node (the producer) sends the data by MPDO in source address mode (SAM). The entry
+    tells this node (the consumer) in which of its objects it stores the data of an object of the
+    producer. See CiA 301, object dispatching list.
 
     Attributes:
         node_id: node-ID of the producer.

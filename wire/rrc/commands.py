@@ -25,7 +25,7 @@ class Parameter:
         width: number of hex digits, 1 or 2.
         low: smallest value. A value below 0 is written in two's complement.
         high: largest value.
-        values: all allowed values by their digits, in either case.
+        values: all allowed values, by their hex digits in upper, lower or mixed case.
     """
 
     __slots__ = ("high", "low", "values", "width")
@@ -246,7 +246,7 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return the joystick settings that are valid after this command.
+        """Return the joystick settings that apply after this command.
 
         A value of #8 to #10 that is out of range does not change the former value (DECISION R14).
 

@@ -16,7 +16,7 @@ _HEX_DIGITS: Final = {bytes([code]): int(chr(code), 16) for code in b"0123456789
 def all_digits(width: int) -> list[bytes]:
     """Return all texts of a given number of hex digits, in upper, lower and mixed case.
 
-    Tables of all valid parameters are made from them.
+    These texts are used to make tables of all valid parameters.
     """
     return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
 

@@ -175,8 +175,9 @@ _COMMANDS: Final = {command.value: command for command in LiteCommand}
 class LiteDecoder:
     """Finds the RTC-Lite frames of one direction in a stream of received bytes (DECISION L6, L7).
 
-    The decoder has no clock. Its owner watches the line and calls `clear` after 100 ms without a
-    byte if a frame has `begun`, or after 20 ms without a byte if the decoder is `lost`.
+    The decoder has no clock, so its owner must watch the line for silences. If a frame has `begun`,
+    the owner calls `clear` after 100 ms without a byte. If the decoder is `lost`, the owner calls
+    `clear` after 20 ms without a byte.
 
     Args:
         layouts: layouts of the frames: `REQUESTS` at the device, `REPLIES` at its proxy on the PC.

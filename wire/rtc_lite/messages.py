@@ -66,7 +66,7 @@ class LitePortProfile:
 class LiteComponentProfile:
     """Data of the RTC-Lite reply (CZ) that ends the description of a component.
 
-    Before it the device has sent a frame for each port.
+    Before this reply the device has sent a frame for each port.
 
     Attributes:
         in_ports: number of PP frames that were sent, one for each in-port.

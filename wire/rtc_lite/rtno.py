@@ -111,7 +111,8 @@ class RtnoPacketDecoder:
     """Finds RTno packets in a stream of received bytes. It is the base class of both directions.
 
     Attributes:
-        lost: whether a packet announced too much data. All bytes are then discarded until `clear`.
+        lost: whether a packet announced too much data. In this case all bytes are discarded until
+            `clear` is called.
     """
 
     lost: bool = field(default=False, init=False)
@@ -164,7 +165,8 @@ class RtnoPacketDecoder:
 class RtnoDecoder(RtnoPacketDecoder):
     """Converts RTno packets of a proxy to RTC-Lite frames, for use at a device.
 
-    It is used like `LiteDecoder`. An unknown letter has the same effect as too much data.
+    The decoder is used like `LiteDecoder`. If a packet has an unknown letter, all bytes are
+    discarded until `clear` is called.
     """
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
@@ -190,10 +192,10 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 class RtnoReplies(RtnoPacketDecoder):
     r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy on a PC.
 
-    It is used like `LiteDecoder(REPLIES)`. RTno omits parts of a frame: the status of a state, the
-    state after a command, the numbers and the type of a profile. This decoder adds the omitted
-    parts that follow from the other parts. The state after a refused command is unknown, so it is
-    written as `?`.
+    It is used like `LiteDecoder(REPLIES)`. RTno omits some parts of RTC-Lite frames: the status in
+    a reply with a state, the state after a command, and the numbers and the type in a profile. This
+    decoder adds the omitted parts if it can compute them from the other parts. The state after a
+    refused command is unknown, so it is written as `?`.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]

@@ -24,7 +24,9 @@ class TimedPose2D(Struct):
 
 
 class TimedPath2DSeq(Struct):
-    """A path: way points with the velocity at each; the first is the start, none means stop."""
+    """A path as a list of way points with velocities. The first point is the start; no point:
+    stop.
+    """
 
     idl_module = "IIS"
 

@@ -47,7 +47,7 @@ class Time(Struct):
             now_us: a time in microseconds.
 
         Returns:
-            The same in seconds and nanoseconds.
+            The same time in seconds and nanoseconds.
         """
         return cls(now_us // 1_000_000, now_us % 1_000_000 * 1_000)
 
@@ -1155,7 +1155,7 @@ class TimedVelocity(Struct):
 
 
 class Path(Struct):
-    """One relay point for the follower; `coordinate` and `r` are unused but for circles.
+    """One point on the path of a path follower; only circles use `coordinate` and `r`.
 
     The public ancestor of Navigation and PathFollower declares it in the module RTC (RS003,
     intellirobot.idl), so that an original component connects.

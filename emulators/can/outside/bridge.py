@@ -17,9 +17,9 @@ _HANDOVER_US: Final = 1_000
 class CanBridge:
     """Connects one end of an emulated bus with a real bus that python-can opens.
 
-    The nodes of the rig communicate on their own wire, and the outside receives each of their
-    frames once. Frames from outside are sent on the wire like those of one more node, so they take
-    the same time there.
+    The nodes of the rig communicate on their own emulated wire. Each of their frames is sent once
+    to the real bus. Frames from the real bus are sent on the emulated wire as if they came from an
+    additional node, so they need the usual time there.
 
     Args:
         end: an end of the wire without a station.
@@ -37,10 +37,10 @@ class CanBridge:
         return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
-        """Send frames that have come from outside since the last poll on the emulated bus.
+        """Send on the emulated bus the frames that the real bus has received since the last poll.
 
-        The frames may have been sent at any time since the last poll. They count as sent right
-        after the last poll, so a host loses no tick by the polling.
+        It is not known when a frame was sent since the last poll. The frames are treated as if they
+        had been sent right after the last poll. Therefore polling does not delay a host by a tick.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)

@@ -60,7 +60,7 @@ class CanBusPort(NonCopyable):
 
     @property
     def failed(self) -> str:
-        """Reason for which the CAN adapter last failed to send or read, or "" without an error."""
+        """Reason why the CAN adapter last failed to send or read, or "" if there was no error."""
         return self.reads.last or self._failed
 
     def poll(self, now_us: int, /) -> Frames:

@@ -54,12 +54,12 @@ class Repeat:
 class CanHost:
     """A host on an emulated bus in virtual time: while the host waits, the time advances.
 
-    It is a `StampedLink`.
+    The class implements the protocol `StampedLink`.
 
     Args:
         rig: the rig to advance.
         end: end of a bus of the rig, without a station.
-        thread: thread that uses the link, or None for the thread that makes the link.
+        thread: thread that uses the link. None means the thread that makes the link.
         hears_own: whether the host also receives its own frames, after they have been on the bus.
     """
 
@@ -137,8 +137,8 @@ class CanHost:
 
         Args:
             timeout_us: longest wait; None for no limit.
-            more: whether this call continues a wait with a timeout. The whole wait counts once
-                (`HostLimit`).
+            more: whether this call continues an earlier wait with a timeout. `HostLimit` then
+                counts both calls as one wait.
 
         Returns:
             Time and frame, or None after the timeout.

@@ -45,7 +45,7 @@ class _CanChannels:
 
     @contextmanager
     def offer(self, name: str, rig: Rig, wire: CanWire) -> Iterator[None]:
-        """Context in which python-can can open a bus of a rig under a channel name.
+        """Context manager during which python-can can open a bus of a rig by a channel name.
 
         Args:
             name: name of the channel.

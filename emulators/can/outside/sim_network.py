@@ -31,10 +31,11 @@ _Names = Mapping[str, object]
 
 
 def retime(target: object, names: _Names, library: str) -> None:
-    """Let the methods of an object use other functions in place of global names, such as a clock.
+    """Replace global names, such as a clock function, in the methods of an object.
 
-    This makes a library run in virtual time. Methods of classes outside the library are not
-    changed, so a subclass whose own methods read the clock reads the real clock.
+    With a virtual clock as the replacement, a library runs in virtual time. Only methods of the
+    library's own classes are changed. If a subclass outside the library has methods that read the
+    clock, these methods read the real clock.
 
     Args:
         target: the object, whose class must not have slots.
@@ -47,7 +48,7 @@ def retime(target: object, names: _Names, library: str) -> None:
 
 
 def retimed(cls: type, names: _Names, library: str) -> type:
-    """Return a subclass whose methods use other functions in place of global names.
+    """Return a subclass in whose methods global names, such as a clock, are replaced.
 
     If no method uses one of the names, return the class itself. See `retime`.
     """

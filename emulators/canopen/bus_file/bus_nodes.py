@@ -352,7 +352,8 @@ def read_bus(
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     """Check a bus.yml for errors that prevent its slaves from being emulated.
 
-    These are errors that `BusFile` does not find, such as errors in `tickrig:` or in the robot.
+    `BusFile` has already checked the form of the file. This function finds further errors, such as
+    errors under the key `tickrig:` or in the description of the robot.
 
     Args:
         bus: content of the file. Without slaves there is nothing to check.

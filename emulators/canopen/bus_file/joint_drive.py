@@ -89,7 +89,8 @@ class JointDrive:
     def servo(self) -> ServoParameters:
         """Parameters of the motor, the power stage and the gear of this joint's drive.
 
-        They are those of the chosen preset, scaled to the torque and the speed of the joint.
+        The parameters come from the chosen preset, and are scaled to the torque and the speed of
+        the joint.
         """
         servo = self._with_supply(PRESETS[self.motor])
         turn = self.per_turn / (2 * pi)

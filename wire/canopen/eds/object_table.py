@@ -188,7 +188,7 @@ class EntryDescription:
     def power_on_data(self, node_id: int) -> bytes:
         """Return the bytes that the entry has at power-on in a given node.
 
-        They are the bytes of the default. If it is relative, the node-ID is added.
+        These are the bytes of the default. If the default is relative, the node-ID is added to it.
 
         Args:
             node_id: node-ID, 1 to 127.
@@ -380,7 +380,7 @@ _MAPPED: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
-    """Values of the communication objects (1000h..1FFFh) that a device does not share with others.
+    """Values of the communication objects (1000h..1FFFh) that differ from device to device.
 
     Attributes:
         device_type: value of 1000h.
