@@ -55,8 +55,8 @@ def arc(
 ) -> tuple[float, float, float]:
     """Return x, y and heading after a body on two wheels has driven an arc.
 
-    This is the computation of `Pose.moved` on plain numbers. It is faster because no `Pose` is
-    made.
+    The function computes the same as `Pose.moved`, but with plain numbers. It is faster because no
+    `Pose` is made.
     """
     x_m, y_m, heading_rad = place
     turn_rad = (right_m - left_m) / tread_m
@@ -317,7 +317,7 @@ class OmniParameters(Immutable):
 class OmniBody(Copyable):
     """A body on three wheels that follow their commanded speeds with a time constant, without slip.
 
-    Not emulated: rollers, slip, mass, encoders, the driver.
+    Rollers, slip, mass, encoders and the motor driver are not emulated.
 
     Attributes:
         parameters: dimensions and response.

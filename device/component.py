@@ -97,7 +97,7 @@ class CallbackRunner(Generic[C]):
         component: the component.
         latest: name of the callback that ran last, or empty before the first callback.
         calls: number of calls of all callbacks.
-        executed: number of calls of `on_execute` among these.
+        executed: number of calls of `on_execute`.
     """
 
     def __init__(self, component: C) -> None:

@@ -21,13 +21,14 @@ class Device(Protocol[W]):
     def due_us(self) -> int:
         """The earliest time at which the device does anything without new input, in microseconds.
 
-        A rig in virtual time jumps to this time, so a tick before it without traffic must have no
-        visible effect. A time in the past means that the next tick does the work. `NEVER` means
-        that nothing happens without input.
+        A rig in virtual time skips the ticks up to this time. Therefore a tick before this time
+        must have no visible effect if there is no traffic. If the time is in the past, the device
+        acts in the next tick. `NEVER` means that the device does nothing without input.
 
-        `due_us` may become earlier in `tick` and `reset`, and by changes between steps, such as
-        inputs or a write to the dictionary. A rig reads it again at each call that advances the
-        time. Within a step, one device affects another only through the wire.
+        The time may become earlier in `tick` and `reset`. Between steps it may become earlier by
+        other changes, such as a new input or a write to the dictionary. Therefore a rig reads it
+        again at each call that advances the time. Within a step, one device affects another only
+        through the wire.
         """
         ...
 
@@ -55,8 +56,8 @@ class UartDevice(Device[bytes], Protocol):
     def uart(self) -> UartSetting | None:
         """Setting of the device's UART after the latest tick or `reset`, or None without a UART.
 
-        The result of a tick is still sent with the setting that was valid before that tick. The new
-        setting applies after the last stop bit of that result. From then on the device also
-        receives with the new setting.
+        If a tick changes the setting, the traffic that this tick returns is still sent with the old
+        setting. The new setting applies to sending and receiving after the last stop bit of this
+        traffic.
         """
         ...

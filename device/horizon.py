@@ -15,9 +15,9 @@ class Horizon(Part):
 
     Attributes:
         passed_us: time up to which all ticks are done.
-        until_us: time up to which only the traffic of a device is observed, so that its ticks can
-            be computed ahead. Until then nothing reads the device between its ticks, except an
-            action of the event queue.
+        until_us: time up to which a device may compute its ticks ahead. Until this time the rig
+            observes only the traffic of the device. Only an action of the event queue may read the
+            device between its ticks.
     """
 
     passed_us: int = 0

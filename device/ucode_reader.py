@@ -87,8 +87,8 @@ def receive(
 ) -> tuple[Reception, ...]:
     """Return what a reader receives from the markers around it, with the nearest marker first.
 
-    Not emulated: walls, which infra-red light does not pass; markers that disturb one another;
-    reflections.
+    Walls, reflections, and markers that disturb one another are not emulated. Therefore a reader
+    also receives markers behind a wall.
 
     Args:
         markers: the sending markers.

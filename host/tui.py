@@ -185,7 +185,7 @@ class LineView(ScrollView, can_focus=True):
 
 
 def rounded_up(total: int) -> int:
-    """Round the height of a view up, so that it seldom changes while lines arrive.
+    """Round the height of a view up, so that the height seldom changes while lines arrive.
 
     Each change needs a new layout, which takes long.
 
@@ -380,7 +380,7 @@ class FramedApp(App[None]):
 
     @contextmanager
     def ended_by_signals(self) -> Iterator[None]:
-        """Context manager in which a signal ends the app only. The code after it still runs."""
+        """Context manager in which a signal ends only the app; the code after it still runs."""
         with stopped_by_signals(self.end):
             yield
 

@@ -211,7 +211,8 @@ class Command:
     Attributes:
         symbol: symbol of two letters, such as `MD`.
         parameters: all parameters, one after the other.
-        string: text that the host adds, with its semicolon, or empty if there is no such text.
+        string: text that the host adds and the reply repeats, with its semicolon, or empty if there
+            is no such text.
     """
 
     symbol: str

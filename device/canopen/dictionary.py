@@ -156,7 +156,7 @@ class Entry(Part):
     def takes_all(self) -> bool:
         """Whether every value of the right size is allowed, and no callback has to be notified.
 
-        Then a value from the bus needs no further check.
+        If this is true, a value from the bus needs no further check.
         """
         low, high, kind = self.description.low, self.description.high, self.data_type
         free = low is None and high is None and kind is not DataType.BOOLEAN

@@ -76,13 +76,13 @@ class _Behaviour(IntEnum):
 class ErrorBehaviour(Service):
     """Changes the NMT state of the slave after an error, as 1029h (error behaviour) demands.
 
-    If 1029h lacks the sub-index of communication errors, they have the effect of the value 0. Other
-    errors without their sub-index have no effect. The service acts after the EMCY producer, so that
-    the EMCY is sent before the slave is Stopped. Writing an undefined value to 1029h is refused
-    with 0609 0030h.
+    Each sub-index of 1029h is for one kind of error. If the sub-index for communication errors is
+    missing, the value 0 is used. If the sub-index for another kind is missing, errors of this kind
+    have no effect. The service acts after the EMCY producer, so that the EMCY is sent before the
+    slave is Stopped. Writing an undefined value to 1029h is refused with 0609 0030h.
 
-    Not emulated: sub-indices of other profiles and of manufacturers. Instead, an application may
-    call `node.enter` itself.
+    Sub-indices that other profiles or manufacturers define are not emulated. Instead, an
+    application may call `node.enter` itself.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -152,9 +152,9 @@ class EmcyProducer(Service):
 
     An error is identified by its code and its text. 1001h is the union of the active errors, and
     its generic bit is set while any error is active. The message at the end of an error contains
-    the register of the remaining errors. Messages that arise in Stopped and in bus-off wait and are
-    sent afterwards. A reset clears errors and messages, so a service whose error persists must
-    raise it again.
+    the register of the remaining errors. In the state Stopped and in bus-off, messages wait and are
+    sent afterwards. A reset clears all errors and waiting messages. Therefore a service must raise
+    its error again if the error still exists after the reset.
 
     Not emulated: 29-bit CAN-IDs.
     """
@@ -303,10 +303,10 @@ _MAX_NODES: Final = 127
 
 
 class EmcyConsumer(Service):
-    """Receives the EMCY messages of other nodes, whose COB-IDs are in 1028h.
+    """Receives EMCY messages of other nodes. The object 1028h contains the COB-IDs of the messages.
 
-    The sub-index is the node-ID of the producer. The application decides how to react. An EMCY
-    without exactly eight bytes is ignored.
+    Each sub-index of 1028h is for the node with this node-ID. The application decides how to react
+    to a message. A message that does not have exactly eight bytes is ignored.
 
     Attributes:
         latest: latest EMCY since the reset, by node-ID.
@@ -361,8 +361,9 @@ class _Producer(NamedTuple):
 class ErrorStateEmcy(Service):
     """Sends an EMCY when the CAN controller is error-passive (8120h) or back from bus-off (8140h).
 
-    8120h is cleared when the controller is error-active again. Bus-off counts as a communication
-    error (1029h). 8140h is sent after the recovery from bus-off and cleared at once.
+    The error 8120h is cleared when the controller is error-active again. The error 8140h is sent
+    after the recovery from bus-off, and is cleared at once. For 1029h, bus-off is a communication
+    error.
 
     Not emulated: the recovery of the controller itself.
 

@@ -141,10 +141,10 @@ class NodeGuarding(Service):
     """Answers guarding requests of the master with the NMT state, and checks that they arrive.
 
     The toggle bit is 0 after a reset and changes with each answer. Life guarding begins with the
-    first request. If no request follows within guard time times life time factor, the slave raises
-    EMCY 8130h and a communication error (1029h). Both last until the next request. While the
-    heartbeat is on (1017h is not 0), requests are neither answered nor supervised. Without 100Ch
-    node guarding is off.
+    first request. Then a request must follow within the guard time multiplied by the life time
+    factor. Otherwise the slave raises EMCY 8130h and a communication error (1029h), which last
+    until the next request. While the heartbeat is on (1017h is not 0), requests are neither
+    answered nor supervised. If the dictionary lacks 100Ch, node guarding is off.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:

@@ -642,12 +642,13 @@ class SdoServers(Service):
     """The SDO servers of a slave: the default server (1200h) and the additional servers (1201h on).
 
     The default server exists even without 1200h. If 1200h exists, it is read-only and shows the
-    COB-IDs of the default server. An additional server is active when both its COB-IDs are valid. A
-    CAN-ID can be changed only while its own COB-ID is invalid. Bit 30 (dynamic) is stored and has
-    no effect. Transfers end silently when the slave enters an NMT state other than Pre-operational
-    and Operational.
+    COB-IDs of the default server. An additional server is active when both its COB-IDs are valid.
+    The CAN-ID in a COB-ID can be changed only while this COB-ID is invalid. Bit 30 (dynamic) is
+    stored and has no effect. When the slave leaves the NMT states Pre-operational and Operational,
+    its transfers end without an abort frame.
 
-    Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
+    29-bit CAN-IDs are not emulated. The slave does not check whether two servers have the same
+    CAN-ID.
 
     Attributes:
         default: server of 1200h.

@@ -88,8 +88,8 @@ class Nonvolatile:
         bit_rate_index: bit timing index stored by LSS, or None if LSS has stored none.
         version: number of changes up to now. An emulator compares it to know when to write its
             file.
-        program: downloaded program (1F50h), which is empty if it was cleared, or None for the
-            built-in program.
+        program: program that was downloaded by 1F50h. It is empty if the program was cleared, or
+            None if the slave has its built-in program.
     """
 
     parameters: dict[int, bytes] = field(default_factory=dict)
@@ -115,8 +115,9 @@ ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 class Service(Copyable):
     """Base class of the communication services of a slave: SDO server, PDOs, SYNC and others.
 
-    When a service is made, it finds its objects in the dictionary and attaches its callbacks to
-    them (`Entry.guard`, `written`, `source`). If its object is missing, the service is off.
+    When a service is made, it searches the dictionary for its objects, and attaches its callbacks
+    to them (`Entry.guard`, `written`, `source`). If the dictionary lacks the object of the service,
+    the service is off.
 
     Attributes:
         node: slave that the service belongs to.
@@ -534,7 +535,7 @@ class CanopenSlave(Copyable):
             self.due_us = self._first_due()
 
     def rewire(self) -> None:
-        """Collect the CAN-IDs that all services receive, and their handlers, again.
+        """Ask all services again which CAN-IDs they receive, and with which handlers.
 
         This is needed after a COB-ID or the NMT state has changed.
         """

@@ -62,7 +62,8 @@ class Ground(Part):
 
     The path in each millisecond is an exact arc.
 
-    Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
+    Castors, slopes and walls are not emulated. If a wheel slips, the force that is needed to turn
+    it does not change.
 
     Args:
         parameters: parameters of the base.

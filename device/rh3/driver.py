@@ -219,7 +219,7 @@ class Driver(Part):
             self._waiting.append((self.now_us + self._delay_us, values))
 
     def step(self, last_request_us: int, until_us: int) -> _Pair:
-        """Run both wheels for one millisecond, and for following milliseconds without any change.
+        """Run both wheels for one millisecond, and for the next ones as long as nothing changes.
 
         Args:
             last_request_us: time of the latest request of the master.

@@ -229,7 +229,7 @@ class Side(Part):
         name: name of the side: `left` or `right`.
         wheel: mechanics of the wheel.
         fault: reason for which the driver switched this wheel off.
-        clipped: whether the target was above the speed limit.
+        clipped: whether the target speed was above the limit, so that it was reduced to the limit.
         stalled: whether full torque has not moved the wheel for too long, and the driver has not
             yet reacted to it.
     """

@@ -130,7 +130,10 @@ class LoadAccount:
     def spend(
         self, line_feeds: int, overflows: int, replies: int, *, status: bool, extra_pct: int
     ) -> None:
-        """Add the work of one period in which the wheelchair (VR2) runs, and subtract one period.
+        """Update the backlog of work for one period in which the wheelchair (VR2) runs.
+
+        The work of this period is added, and the work that the RRC can do in a period is
+        subtracted.
 
         Args:
             line_feeds: number of received line feeds.

@@ -199,10 +199,10 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits of a `limit` command, with their signs.
 
-    First each input is limited to its own limit. Then both values are multiplied by one common
-    factor, which keeps the direction of travel. It is the smallest of the factors that the limits
-    of sum, product and radius require (RRC manual, `limit`). All arithmetic is integer and rounds
-    down (DECISION R19).
+    First translation and rotation are each limited to their own limit. Then both are multiplied by
+    the same factor, so that the direction of travel stays the same. The limits of sum, product and
+    radius each require a factor, and the smallest of these factors is used (RRC manual, `limit`).
+    All arithmetic is integer and rounds down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)

@@ -91,8 +91,8 @@ class ReceiveBuffer:
     Attributes:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
-        thrown_blocks: number of further blocks of `size` bytes that were discarded after an
-            overflow, in the same line.
+        thrown_blocks: number of bytes that were discarded after an overflow up to the end of the
+            line, counted in blocks of `size` bytes.
     """
 
     size: int
@@ -176,11 +176,11 @@ _STAYS: Final = ((Move.OUTPUT, RrcState.OUTPUT), (Move.LIMIT, RrcState.LIMIT))
 class Rrc(Copyable):
     """An emulated RRC (Robotic Relay Communicator), which controls a VR2 wheelchair for a host.
 
-    It is a `Device[bytes]`. If `config.vehicle` is set, the emulation includes the motion of the
-    wheelchair. The numbers of this vehicle are our choice (vehicle.py).
+    The class implements the protocol `Device[bytes]`. If `config.vehicle` is set, the emulation
+    includes the motion of the wheelchair. Its speeds and other numbers are assumptions
+    (vehicle.py).
 
-    Not emulated: the traffic on the VR2 bus itself, the sound of the alarm button's horn, the USB
-    serial driver.
+    The traffic on the VR2 bus, the sound of the horn and the USB serial driver are not emulated.
 
     Attributes:
         config: configuration with durations, names and sizes.

@@ -230,8 +230,9 @@ class Plant(Part):
     def bear(self, load_nm: float, efficiency: float) -> None:
         """Set the external torque on the output shaft. The loss in the gear acts as friction.
 
-        If the torque opposes the motion, the motor must supply 1 / efficiency of it. If the torque
-        acts with the motion, the motor gets only the transmitted share of it.
+        If the torque acts against the motion, the motor must supply the torque divided by
+        `efficiency`. If the torque acts in the direction of motion, only the share `efficiency` of
+        the torque reaches the motor.
 
         Args:
             load_nm: external torque.

@@ -40,7 +40,8 @@ class ThermalModel(Part):
     The heat is R I^2, and R grows with the temperature. The system stays linear, so its state at
     any later time is computed by a formula, without steps.
 
-    Not modelled: heat of friction and iron, the gear, the power stage, moving air.
+    The model does not include heat from friction and iron, the gear, the power stage and moving
+    air.
     """
 
     __slots__ = ("_capacities", "_motor")
@@ -109,9 +110,10 @@ def _span(rate: float, seconds: float) -> float:
 class I2t(Part):
     """I2t protection of a power stage, which limits the time of currents above the continuous one.
 
-    A budget of (peak^2 - continuous^2) * time fills with the square of the current above the
-    continuous current, and drains when the current is below it. When the budget is full, only the
-    continuous current is allowed until the budget is empty again.
+    The protection has a budget of (peak^2 - continuous^2) * time. While the current is above the
+    continuous current, the budget fills by the difference of the squared currents. While the
+    current is below, the budget drains. When the budget is full, only the continuous current is
+    allowed until the budget is empty again.
 
     Attributes:
         filled_a2s: used part of the budget.
@@ -382,8 +384,8 @@ class ServoSettings(Copyable):
 class Readings(ServoSettings):
     """Readings of a servo: position, speed, current and temperatures. `Servo` inherits them.
 
-    Integers are measurements as the drive sees them. Floats are exact values for observers. The
-    docstring of `Servo` describes the attributes.
+    Attributes with integers are measurements as the drive sees them. Attributes with floats are
+    exact values for observers. The docstring of `Servo` describes the attributes.
     """
 
     __slots__ = (
@@ -418,7 +420,7 @@ class Readings(ServoSettings):
     def gear_counts(self) -> int:
         """Angle of the output shaft from its absolute encoder, in counts with all turns.
 
-        It is 0 if the servo has no such encoder.
+        The value is 0 if the servo has no absolute encoder.
         """
         return floor(self.shaft_deg / 360.0 * self.parameters.encoders.gear_counts_per_turn)
 
@@ -431,7 +433,8 @@ class Readings(ServoSettings):
     def spare_mv(self) -> int:
         """Voltage left for driving current, in mV: largest voltage of the stage minus the back-EMF.
 
-        It is below 0 if an external load turns the motor faster than the supply can.
+        The value is below 0 if an external load turns the motor faster than the supply could turn
+        it.
         """
         stage, motor = self.parameters.stage, self.parameters.motor
         speed_rad_s = 0.0 if self.encoder_unplugged else abs(self._plant.speed_rad_s)

@@ -281,7 +281,7 @@ class Servo(Readings):
     ) -> None:
         """Demand a position, as for the next step of a position controller.
 
-        Velocity and acceleration are fed forward to the velocity loop.
+        The velocity loop also gets the demanded velocity and acceleration (feed-forward).
 
         Args:
             position: demanded position now, in counts. Fractions are accepted.
@@ -310,9 +310,10 @@ class Servo(Readings):
     ) -> RunAhead:
         """Compute the next control steps ahead, without applying them.
 
-        The results are exactly those of single steps. The run ends before the first step in which
-        friction stops or holds the shaft, the demand is limited, the resistance of the motor
-        changes, or the bounds are left. Single steps can continue from the end of the run.
+        The results are exactly the same as if each step were computed separately. The computation
+        ends before a step that needs separate treatment. In such a step friction stops or holds the
+        shaft, the demand is limited, the resistance of the motor changes, or the servo leaves the
+        bounds.
 
         Args:
             line: demanded positions without acceleration, beginning with the present demand.

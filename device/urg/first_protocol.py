@@ -131,8 +131,8 @@ class Sensor(Protocol):
         """Return the answer to a G command with the latest scan.
 
         Returns:
-            The answer, or b"" if it follows after the next scan, or None if the sensor refuses the
-            command.
+            The answer. The result is b"" if the sensor will send the answer after the next scan, or
+            None if the sensor refuses the command.
         """
         ...
 

@@ -221,7 +221,8 @@ class ScipServer(Part):
     Until a host switches to SCIP 2.0, the server executes the commands of SCIP 1.1
     (`first_protocol`).
 
-    Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a self-test.
+    The command DB, the mode for firmware updates, and the statuses 21..49 and 98 of a self-test are
+    not emulated.
 
     Args:
         parameters: parameters of the sensor.
@@ -334,8 +335,8 @@ class ScipServer(Part):
         """Return the answer to a command that requests a single scan.
 
         Returns:
-            The answer with the latest scan, or b"" if it follows after the next scan, or None if
-            the laser is off or another command waits.
+            The answer with the latest scan. The result is b"" if the sensor will send the answer
+            after the next scan, or None if the laser is off or another command waits.
         """
         if not self.laser or self._waiting is not None:
             return None

@@ -333,8 +333,8 @@ class _NoDistance(IntEnum):
 class View(Immutable):
     """One scan of a sensor. The distances are computed when they are requested.
 
-    Not emulated: motion of the sensor during a scan; angle of incidence, colour and gloss of
-    objects; beams wider than a line.
+    The sensor is assumed not to move during a scan, and a beam is a line without width. The angle
+    of incidence and the colour and gloss of objects have no effect.
 
     Attributes:
         number: number of the scan since power-up.
@@ -356,8 +356,8 @@ class View(Immutable):
         """Return the distances of a range of steps in mm: the least distance of each cluster.
 
         A step is one direction of the scan, and a cluster is a group of consecutive steps. If no
-        step of a cluster has a distance, the number is the code of its first step. Steps after the
-        last whole cluster have no number (DECISION U11).
+        step of a cluster has a distance, the number of the cluster is the error code of its first
+        step. The result has no numbers for steps after the last whole cluster (DECISION U11).
 
         Args:
             first: first step.

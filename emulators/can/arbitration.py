@@ -100,9 +100,9 @@ class CanArbiter(ArbiterFields):
         """Remove and return the nodes that send next, while some other nodes may not send yet.
 
         Args:
-            everybody: if true, all nodes that may send at the start of the frame are chosen,
-                because there is no arbitration on a bus with a short circuit. If false, only the
-                nodes that win the arbitration are chosen.
+            everybody: whether to choose all nodes that may send at the start of the frame. This is
+                needed on a bus with a short circuit, where no arbitration is possible. If false,
+                only the nodes that win the arbitration are chosen.
 
         Returns:
             The start of the next frame, and the nodes.

@@ -123,8 +123,8 @@ class WireLog:
         """Return the incomplete line or frame of each direction, as an entry with the number 0.
 
         Args:
-            by_gap: if true, only frames that end by a silence are returned. Such a frame may
-                already be complete. If false, only the other lines and frames are returned.
+            by_gap: whether to return only frames that end by a silence. Such a frame may already be
+                complete. If false, only the other lines and frames are returned.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

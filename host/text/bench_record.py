@@ -114,7 +114,7 @@ class BenchParser:
         self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
-        """Parse the lines of the trace, and yield a record for each. Times must not decrease.
+        """Parse the lines of the trace, and yield one record for each; times must not decrease.
 
         Raises:
             TraceError: a line is damaged, an earlier time follows, or a line follows the end mark.

@@ -45,8 +45,8 @@ def near(name: str, names: Iterable[str]) -> str:
 def closest(name: str, names: Iterable[str]) -> list[str]:
     """Return the known name that is most similar to a misspelled one.
 
-    The result is an empty list if no name is similar. Case is ignored. A name that differs only in
-    its numbers is another name, not a misspelling.
+    The result is an empty list if no name is similar. Case is ignored. If two names differ only in
+    their numbers, they are not similar.
 
     >>> closest("EPOS", ["epos", "rrc"]), closest("stik", ["left/stick", "right/stick"])
     (['epos'], ['left/stick'])

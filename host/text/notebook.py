@@ -55,7 +55,7 @@ def table(
         rows: cells of the rows.
         title: title of the table. A table with a title can be folded.
         opened: whether a foldable table is unfolded at first.
-        most: maximum number of shown rows. A line below the table gives the number of the others.
+        most: maximum number of shown rows. A line below the table has the number of omitted rows.
     """
     every = iter(rows)
     shown = list(islice(every, most))

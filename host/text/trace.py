@@ -149,7 +149,7 @@ def parse_record(line: str, number: int) -> Record:
 
 
 def parse_records(lines: Iterable[str]) -> Iterator[Record]:
-    """Parse the lines of a trace after its header, and yield a record for each.
+    """Parse the lines of a trace after its header, and yield one record for each line.
 
     Raises:
         TraceError: a line is damaged, its time is before that of the line above, or it follows the

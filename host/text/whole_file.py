@@ -41,7 +41,7 @@ def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
     Args:
         path: path of the output file.
         what: name of the output file in messages, such as `--html`.
-        inputs: paths that the run reads. Those that are not files are ignored.
+        inputs: paths that the run reads. Paths that are not files are ignored.
 
     Raises:
         ValueError: the output file is one of the inputs.
@@ -166,10 +166,11 @@ class LineFile:
     Args:
         path: path of the file. An existing file is replaced.
         first: first line of the file.
-        running: noun for what continues without the recording, used in the warning.
+        running: text for the warning, such as `the emulator`. It names the program that continues
+            without the recording.
 
     Attributes:
-        error: reason why the recording has ended early, empty if it has not.
+        error: reason why the recording has ended early, or empty if it has not ended early.
 
     Raises:
         OSError: the file cannot be opened.

@@ -62,7 +62,8 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
         name: name of the file, for error messages.
 
     Returns:
-        The tree, or None if the text is empty or cannot be parsed, and the errors.
+        A pair of the tree and the list of errors. The tree is None if the text is empty or cannot
+        be parsed.
     """
     try:
         root = _composed(text)

@@ -72,7 +72,7 @@ _ANY_QUICK_STOP: Final = (
 
 
 def state_of(statusword: int) -> DriveState | None:
-    """Return the state of the drive that a statusword contains, or None without a valid state."""
+    """Return the state of the drive that a statusword contains, or None if the state is invalid."""
     for state in DriveState:
         if statusword & (0x4F if state in _ANY_QUICK_STOP else 0x6F) == state:
             return state

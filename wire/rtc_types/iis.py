@@ -24,8 +24,9 @@ class TimedPose2D(Struct):
 
 
 class TimedPath2DSeq(Struct):
-    """A path as a list of way points with velocities. The first point is the start; no point:
-    stop.
+    """A path: way points with the velocity at each of them.
+
+    The first way point is the start. A path without way points means stop.
     """
 
     idl_module = "IIS"

@@ -18,9 +18,9 @@ from tickrig.wire.canopen.datatypes import DataType
 class DigitalObjects(NamedTuple):
     """Indices of the objects that contain one property of digital lines, such as their polarity.
 
-    CiA 401 has objects of several widths for the same lines: an entry has one line, 8, 16 or 32
-    lines. For single lines there are eight consecutive objects, each for up to 128 lines. `single`
-    is the first of them.
+    CiA 401 has objects of several widths for the same lines: an entry contains one line, or 8, 16
+    or 32 lines. For entries with one line there are eight consecutive objects, and each has up to
+    128 lines. `single` is the index of the first of these eight objects.
     """
 
     single: int

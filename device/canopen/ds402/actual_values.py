@@ -75,8 +75,7 @@ class ActualValues(Part):
     """The objects of a drive that show actual values, such as position, velocity and current.
 
     A value is computed when the object is read. Only objects with watchers are computed in each
-    tick. This saves time: a bus reads only two of the thirteen objects every 10 ms, so 1.5 times as
-    many drives are possible.
+    tick. This saves time, because most objects are seldom read.
 
     Args:
         drive: drive whose `measures` compute the values.

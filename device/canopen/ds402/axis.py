@@ -319,7 +319,7 @@ _STAYING: Final = 4
 class Stopping(Part):
     """Brakes an axis according to an option code, such as 605Ah for a quick stop.
 
-    Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
+    The options 4 and 8 (voltage limit) and options of a manufacturer are not emulated.
 
     Args:
         axis: axis whose demanded velocity is reduced.
@@ -394,8 +394,9 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 class Switches(Part):
     """The limit switches and the home switch of an axis, as the drive reads them.
 
-    A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. Negative
-    and positive are the directions of the user, after the polarity 607Eh is applied.
+    A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles.
+    "Negative" and "positive" limit switch mean the directions that the user sees, to which the
+    polarity 607Eh is already applied.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.
@@ -483,7 +484,7 @@ class Limits(Part):
         return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
     def reached(self) -> ErrorCode | None:
-        """Return the error code of the limit that must end the present motion, or None without one.
+        """Return the error code if a limit must end the present motion, otherwise None.
 
         The limit is a limit switch that is pressed in the direction of motion, or a software limit
         that the motion would exceed if it did not brake now.

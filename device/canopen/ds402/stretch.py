@@ -40,7 +40,7 @@ class Stretch(Part):
         self._bounds: Bounds
 
     def plan(self, now_us: int, *, requested: bool) -> int:
-        """Compute the ticks after the present tick ahead, as far as they only continue the motion.
+        """Compute the ticks that follow the present tick, as long as they only continue the motion.
 
         Args:
             now_us: time of the present tick.

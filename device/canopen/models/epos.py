@@ -86,8 +86,8 @@ class Epos(Ds402):
     per second, positions in counts of the motor's encoder. Bit 8 of the statusword means that the
     current offset is measured. Bit 15 means that the position refers to a home position.
 
-    Not emulated: gains of the loops, digital and analogue inputs, the modes master encoder and
-    step, RS232.
+    The gains of the control loops, the digital and analogue inputs, the modes "master encoder" and
+    "step", and RS232 are not emulated.
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = {**modes.MODES, **maxon.MODES}

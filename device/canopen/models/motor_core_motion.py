@@ -137,8 +137,9 @@ _MAX_CURRENT_MA: Final = 10_000
 class References(Part):
     """The reference and the limits that the master writes to a motor core unit, in physical units.
 
-    On the bus 32767 stands for the full scale of an angle, velocity or current. After a failure the
-    error value 6444h:01 is the reference until the next reference arrives, if 6443h:01 is not 0.
+    On the bus the number 32767 stands for the full scale of an angle, velocity or current. If
+    6443h:01 is not 0, the error value 6444h:01 is used as the reference after a failure, until the
+    master sends a new reference.
 
     Args:
         node: the slave.
@@ -495,7 +496,7 @@ class Status(IntFlag):
 class Display(Part):
     """Writes the status (2001h) and the measured values (6401h) of a motor core unit.
 
-    They are written to the dictionary once in each control tick.
+    The object writes these values to the dictionary once in each control tick.
 
     Args:
         dictionary: the dictionary of the unit.

@@ -280,8 +280,8 @@ class DamConsumer(Part):
 class SamConsumer(Part):
     """Receives MPDOs in source address mode, which name an object of their producer.
 
-    The object dispatching list assigns an object of this slave to the producer's object. The MPDO
-    is written to this object. An MPDO with an object that is not in the list is ignored.
+    The object dispatching list tells to which object of this slave the data are written. If the
+    producer's object is not in the list, the MPDO is ignored.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:

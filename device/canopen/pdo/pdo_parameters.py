@@ -42,7 +42,7 @@ class PdoParameters(Part):
     invalid. The transmission type, the event timer and bit 30 of the COB-ID can always be changed.
     A write that breaks these rules is refused with 0609 0030h.
 
-    Not emulated: PDOs with a 29-bit CAN-ID; bit 29 is refused.
+    PDOs with a 29-bit CAN-ID are not emulated, so bit 29 of the COB-ID is refused.
 
     Args:
         dictionary: dictionary of the slave, in which the objects of the PDO may be missing.
@@ -187,7 +187,7 @@ class Silent(TpdoMode):
 class SynchronousAcyclic(TpdoMode):
     """Transmission type 0: the TPDO is sent with a SYNC, but only after an event.
 
-    It is also sent with the first SYNC after the start.
+    The TPDO is also sent with the first SYNC after the start.
     """
 
     synchronous: ClassVar[bool] = True
@@ -250,7 +250,7 @@ class SynchronousCyclic(TpdoMode):
 class RtrSynchronous(TpdoMode):
     """Transmission type 252: a remote frame is answered with the data sampled at the latest SYNC.
 
-    Before the first SYNC the data are those at the start of the PDO.
+    Before the first SYNC, the answer contains the data that were sampled at the start of the PDO.
     """
 
     synchronous: ClassVar[bool] = True

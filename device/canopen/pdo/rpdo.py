@@ -199,8 +199,8 @@ class PdoConsumer(Service):
     """Receives the RPDOs of a slave in Operational, and writes their data to the mapped objects.
 
     Synchronous RPDOs are kept until the next SYNC. On SYNC they are written to their objects in the
-    order of their numbers, before the synchronous TPDOs of the same SYNC are made. The order of the
-    frames on the bus decides which RPDOs come before the SYNC, also within a tick.
+    order of their numbers, before the synchronous TPDOs of the same SYNC are made. An RPDO belongs
+    to a SYNC if it was before the SYNC on the bus, even if both arrive in the same tick.
 
     Attributes:
         rpdos: RPDOs that the dictionary has.

@@ -232,7 +232,7 @@ class PdoProducer(Service):
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:  # noqa: D417
         """Write an object of another node with an MPDO in destination address mode.
 
-        The first such MPDO of the slave is used. Without one, nothing is sent.
+        The slave uses its first TPDO that is such an MPDO. If it has none, nothing is sent.
 
         Args:
             node_id: node-ID of the destination, or 0 for all nodes.

@@ -99,9 +99,9 @@ class PlannedFault:
         name: name as in the request, with device and rate: `left_drive/flip=0.01`.
         from_us: time at which the fault began, or None if its trigger did not occur.
         to_us: time at which the fault ended, or None if the fault stayed.
-        when: trigger of the fault, such as `the 3rd OK:output`. If a fault with a start time has
-            not begun, this text is the start time. The text is empty if the fault began at its
-            time.
+        when: trigger of the fault, such as `the 3rd OK:output`. If a fault did not occur because
+            its start time was not reached, this text is the start time. The text is empty if the
+            fault began at its time.
         ordered_us: time at which the fault was requested, or None if unknown, as for a manual
             fault.
     """

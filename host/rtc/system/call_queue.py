@@ -154,12 +154,11 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 class Arrivals:
     """Queue of values received by other threads, which are processed at the start of the next tick.
 
-    No code reads a value before the next tick, so values need not wake the manager's thread. Waking
-    it for each value would take three times the processor time. The queue is an item of a
-    `Schedule`.
+    No code reads a value before the next tick. Therefore an arriving value does not wake the
+    manager's thread, which saves processor time. The queue is an item of a `Schedule`.
 
     Attributes:
-        due_us: due time, which is always `NEVER`, because the values wait for a tick that is due
+        due_us: due time of the queue, which is always `NEVER`. The values wait until a tick is due
             for another reason.
     """
 

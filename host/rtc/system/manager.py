@@ -145,8 +145,8 @@ class Remotes:
 class NameService:
     """Table of a manager's components by their path, such as `localhost/ConsoleIn0.rtc`.
 
-    The paths are written as in rtshell. They exist only in this process. Not emulated: a CORBA
-    naming service for other processes.
+    The paths are written as in rtshell. They exist only in this process, because a CORBA naming
+    service for other processes is not emulated.
     """
 
     def __init__(self) -> None:

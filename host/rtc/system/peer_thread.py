@@ -44,9 +44,9 @@ def calls_run() -> bool:
 
 
 class PeerThread:
-    """Thread that makes the calls to one peer, a component in another process, one by one.
+    """Thread that makes all calls to one component in another process (the peer), one by one.
 
-    A call that hangs delays the calls after it, up to the time-out of the engine (1 s for a CORBA
+    If a call hangs, the calls after it wait until the time-out of the engine (1 s for a CORBA
     call). The thread is a daemon thread, so it does not keep the process alive.
 
     Args:
@@ -129,9 +129,9 @@ class PeerCaller(Protocol):
 class PeerThreads:
     """A pool of threads that make the calls of many connectors to components in other processes.
 
-    Each connector makes one call at a time. While the calls are answered at once, one thread makes
-    them all, because one thread for each connector would take three times the processor time. If
-    calls have to wait, a second thread is started, and a further one for each call that hangs.
+    Each connector makes one call at a time. While all calls are answered at once, a single thread
+    makes them, which saves processor time. If calls have to wait, a second thread is started. Each
+    call that hangs starts a further thread.
 
     Args:
         name: name of the threads, for the log.

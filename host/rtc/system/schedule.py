@@ -25,9 +25,12 @@ class Schedule:
     """Runs the execution contexts and connectors of a system at their due times.
 
     The schedule reads no clock, because the caller passes the time to `tick`. In virtual time,
-    `run_to` and `run_for` call `tick` without waiting. In real time, `RealTime` waits and calls it.
-    A tick has four steps: additional items run, then the execution contexts run in the order in
-    which they were added, then connectors push their values, then deferred calls run.
+    `run_to` and `run_for` call `tick` without waiting. In real time, `RealTime` waits and calls
+    `tick`.
+
+    A tick has four steps. First the additional items run. Then the execution contexts run in the
+    order in which they were added. Then connectors push their values. At the end deferred calls
+    run.
 
     Attributes:
         now_us: time of the latest tick in us.

@@ -28,8 +28,8 @@ class ComponentEntry:
         name: instance name of the component.
         type_name: name of the component type.
         rate_hz: rate of the component's execution context in periods per second.
-        context: any word that is the same for all components in one shared execution context, or
-            empty if the component has its own.
+        context: name of the execution context that the component shares with other components. The
+            name may be any word. It is empty if the component has its own execution context.
         active: whether the component is activated.
         configuration_set: name of the active configuration set.
         configuration: values of each configuration set as text, by set and parameter name.
@@ -116,10 +116,11 @@ def restore(manager: Manager, system: System) -> None:
 
 
 def with_remotes(system: System, types: Container[str]) -> System:
-    """Return a copy of a system description in which components of unknown types are remote ones.
+    """Return a copy of a system description, with components of unknown types as remote components.
 
-    An RTSProfile can describe a system that several processes run. Its components that cannot be
-    created here therefore run elsewhere. Only components with a path can become remote ones.
+    An RTSProfile can describe a system that several processes run. If this process cannot create a
+    component, the component runs in another process. Only a component with a path can become a
+    remote component.
 
     Args:
         system: system description that was read.

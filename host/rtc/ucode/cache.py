@@ -125,7 +125,7 @@ class _Entry(Generic[_V]):
 class LookupCache(Generic[_V]):
     """Cache of values by address in front of a source.
 
-    It returns old values if the source is not available.
+    If the source is not available, the cache returns old values.
 
     Args:
         parse: function that makes a value from the text at an address. If it raises ValueError, the

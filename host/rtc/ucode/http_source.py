@@ -22,8 +22,8 @@ MOST_OCTETS: Final = 8_192
 class HttpSource:
     """HTTP client that does not block, because its own thread sends the GET requests.
 
-    An answer may take `timeout_s` and have 8192 octets at most. Only the named hosts get requests,
-    redirections are not followed, and HTTPS is not supported.
+    An answer must arrive within `timeout_s`, and may have at most 8192 bytes. The client sends
+    requests only to the given hosts. It does not follow redirections, and does not support HTTPS.
 
     Args:
         name: name of the client, for messages.

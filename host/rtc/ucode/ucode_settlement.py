@@ -20,7 +20,7 @@ _MOST_CHARACTERS: Final = 1_000
 
 
 class UcodeSettlement(Lookup[str]):
-    """Component that asks a service at which address there is information about a ucode.
+    """Component that asks a service for the address of the information about a ucode.
 
     The ports are `ucodes` in, and `addresses` out. A value of `addresses` alternates ucodes and
     their addresses. The service has the address as text under `SERVICE/ucodes/UCODE`. Invalid

@@ -340,11 +340,14 @@ class EdsDevice:
 def read_device(file: EdsFile) -> EdsDevice:
     """Return the device that an EDS or DCF file describes.
 
-    Invalid parts are skipped and added to the errors of the file. A deviation from the standard
-    with a clear meaning becomes a warning that names the value used: C suffixes, empty and missing
-    keywords, CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) is used as
-    power-on value. ObjFlags concern configuration tools, not the device, and are dropped. Objects
-    implied by CompactPDO and objects of connected modules are included.
+    Invalid parts are skipped, and an error is added to the errors of the file. Some deviations from
+    the standard have a clear meaning, for example C suffixes, empty and missing keywords,
+    CompactSubObj in a RECORD, and texts with characters outside ASCII. Such a deviation becomes a
+    warning with the value that is used.
+
+    The ParameterValue of a DCF is used as the power-on value. ObjFlags are ignored, because they
+    concern only configuration tools. The result includes the objects that CompactPDO describes, and
+    the objects of connected modules.
     """
     kinds = _kinds(file)
     entries = list(_entries(file, kinds))

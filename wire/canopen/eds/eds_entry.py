@@ -22,7 +22,7 @@ _OCTETS: Final = DataType.OCTET_STRING
 
 
 class StandardObject(NamedTuple):
-    """What CiA 301 requires of an object, or of each object in a range, to check an EDS.
+    """The rules of CiA 301 for an object, or for each object in a range, to check an EDS.
 
     Attributes:
         composed: whether the object has sub-indices.
@@ -80,7 +80,7 @@ _RANGES: Final = (
 
 
 def standard_object(index: int) -> StandardObject | None:
-    """Return what CiA 301 requires of the object with an index, or None if nothing is checked."""
+    """Return the rules of CiA 301 for the object with an index, or None if there are no rules."""
     for area, found in _RANGES:
         if index in area:
             return found
@@ -137,7 +137,8 @@ def read_entry(
 ) -> object_table.EntryDescription:
     """Read the description of one entry from its section of an EDS.
 
-    If a keyword is missing, the file collects a warning or error with the value used instead.
+    If a keyword is missing, a warning or error is added to `file`. It has the value that is used
+    instead.
 
     Args:
         file: the EDS, which collects errors and warnings.
@@ -302,7 +303,8 @@ def read_value_beside(
         kind: data type of the value.
 
     Returns:
-        The bytes, or None if the DCF has no value; and whether to add the node-ID.
+        The bytes of the value, or None if the DCF has no value. The second part of the result is
+        true if the node-ID must be added to the value.
     """
     place = f"{index:04X}Value"
     said = _text(file, place, str(sub), kind)

@@ -73,8 +73,8 @@ class Finding(NamedTuple):
 def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
     """Yield errors and warnings about EDS files as lines of text.
 
-    If several sections of a file have the same finding, there is one line, with the number of the
-    others.
+    If several sections of a file have the same error or warning, only the first of them has a line.
+    The line ends with the number of the other sections.
     """
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):
@@ -159,7 +159,7 @@ class EdsFile:
 
     @property
     def is_dcf(self) -> bool:
-        """Whether the file is a DCF: its name ends as that of a DCF, or it has a node-ID."""
+        """Whether the file is a DCF: it has the suffix of a DCF, or it contains a node-ID."""
         return self.name.lower().endswith(_DCF_ENDINGS) or "DeviceComissioning" in self.sections
 
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
@@ -175,8 +175,8 @@ class EdsFile:
     def line(self, section: str, key: str = "") -> int:
         """Return the line number of a keyword in a section.
 
-        If the file does not have the keyword, return the line of the section, or 0 without the
-        section.
+        If the section does not have the keyword, the result is the line of the section. If the file
+        does not have the section, the result is 0.
         """
         place = self._places.get((section, key.lower()))
         return place or self._places.get((section, ""), 0)
@@ -193,9 +193,10 @@ class EdsFile:
     def word(self, section: str, key: str) -> str:
         """Return the value of a keyword that is a number or a word, without a trailing comment.
 
-        In CiA 306 comments are separate lines, but readers also accept ` ;` after any value. After
-        a number or an access type, `;`, `#` and `//` start a comment, too, with a warning, because
-        these characters have no other meaning there. In a text they may be part of the text.
+        In CiA 306 a comment is a line of its own, but many programs also accept a comment that
+        begins with ` ;` after a value. After a number or an access type, `;`, `#` and `//` begin a
+        comment, because these characters have no other meaning there. Such a comment becomes a
+        warning.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)
@@ -205,9 +206,9 @@ class EdsFile:
         return said
 
     def numeric(self, section: str, key: str) -> str:
-        """Return the text of a number, converted to the notation of CiA 306.
+        """Return the text of a number from the file, converted to the notation of CiA 306.
 
-        If the file has another notation, a warning is added to it.
+        If the number in the file has another notation, a warning is added to the findings.
         """
         text = self.value(section, key)
         if eds_value.is_plain_number(text):
@@ -230,8 +231,9 @@ class EdsFile:
     ) -> int:
         """Return the value of a keyword as a number.
 
-        The default is used if the keyword is missing. It is used with a warning if the keyword is
-        empty, not a number, or not in `low` to `high`.
+        If the keyword is missing, the result is the default. If the value is empty, is not a
+        number, or is not within `low` to `high`, the result is also the default, and a warning is
+        added.
 
         Args:
             section: section of the keyword.

@@ -323,11 +323,12 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
     Args:
         kind: data type of the limited value.
         text: text, which is not empty.
-        upper: whether the limit is HighLimit. A limit beyond the type, which has no effect, is
-            kept.
+        upper: whether the limit is HighLimit. A limit that lies outside the range of the data type
+            has no effect and is kept.
 
     Returns:
-        The limit, or None if values of the type have no limits or the limit depends on the node-ID.
+        The limit. The result is None if values of this type have no limits, or if the limit depends
+        on the node-ID.
 
     Raises:
         ValueError: the text is not a number of at most 64 bits.

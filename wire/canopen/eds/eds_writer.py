@@ -51,9 +51,10 @@ def write_eds(
 ) -> str:
     """Return the text of an EDS that describes the given objects with their default values.
 
-    Properties without a CiA 306 keyword are written as comments if needed: `MaxBytes` limits a
-    string or domain, `DefaultBytes` gives a default that no text can express. The file is dated
-    1970, so that the same dictionary always gives the same text.
+    Two properties have no keyword in CiA 306, and are written as comments where they are needed.
+    `MaxBytes` is the largest size of a string or domain. `DefaultBytes` is a default that a text
+    cannot express. The date of the file is in 1970, so that the same dictionary always gives the
+    same text.
 
     Args:
         table: the objects.

@@ -77,7 +77,7 @@ class CyclicPosition(_LatchedSetPoint):
     The motion takes one interpolation period and then stops. Each SYNC begins a new line to the
     present target. Without SYNC, a new target begins a new line.
 
-    Not emulated: extrapolation when SYNC is late; the torque offset.
+    The torque offset, and an extrapolation of the motion when SYNC is late, are not emulated.
 
     Attributes:
         rests: whether the mode counts as idle when the target is the present position.
@@ -141,7 +141,7 @@ class InterpolatedPosition(CyclicPosition):
     period, and bit 10 is set at its end. Each SYNC begins a new line. Without SYNC, a new record
     begins a new line.
 
-    Not emulated: a buffer of records (60C4h); sub-modes other than 0 (60C0h).
+    A buffer of records (60C4h) and sub-modes other than 0 (60C0h) are not emulated.
     """
 
     halts = True
@@ -188,8 +188,8 @@ class InterpolatedPosition(CyclicPosition):
 class CyclicVelocity(Mode):
     """Cyclic synchronous velocity mode (csv): ramps the velocity evenly to the target velocity.
 
-    The ramp takes one interpolation period. When the mode is chosen while the drive is enabled, the
-    present velocity of the reference becomes the target velocity, so that the motion continues.
+    The ramp takes one interpolation period. If the mode is chosen while the drive is enabled, the
+    motion continues, because the target velocity is set to the present demanded velocity.
     """
 
     control: ClassVar[Control] = Control.VELOCITY

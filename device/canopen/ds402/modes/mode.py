@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 class ModeBit(IntEnum):
     """Bits of the statusword whose meaning depends on the mode of operation.
 
-    The class is an `IntEnum` because the operators of `int` are 20 times as fast as those of a
-    flag.
+    The members are plain numbers, which are faster than the members of a flag.
     """
 
     TARGET_REACHED = Statusword.TARGET_REACHED
@@ -118,9 +117,9 @@ class Mode(Part):
         return self.halt(now_us)
 
     def ahead(self) -> Line | None:
-        """Return the demanded motion of the next steps if no input changes, or None if unknown.
+        """Return the demanded motion of the next steps for the case that no input changes.
 
-        A drive uses it to compute several ticks at once.
+        A drive calls this method to compute several ticks at once.
 
         Returns:
             The line, with the largest velocity at which it may continue, or None if each step needs
