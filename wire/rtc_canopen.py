@@ -435,7 +435,7 @@ _HEARTBEAT_MS: Final = 100
 
 
 def object_table(profile: RtcProfile) -> ObjectTable:
-    """Return the objects of a DeviceRTC: the objects of CiA 301, and an object for each port."""
+    """Return the objects of a DeviceRTC: those of CiA 301, and one per port (from 2100h on)."""
     table = ObjectTable()
     communication = CommunicationProfile(
         device_type=_NO_PROFILE,

@@ -313,7 +313,7 @@ class Servo(Readings):
         The results are exactly the same as if each step were computed separately. The computation
         ends before a step that needs separate treatment. In such a step friction stops or holds the
         shaft, the demand is limited, the resistance of the motor changes, or the servo leaves the
-        bounds.
+        bounds. Afterwards the servo can continue with single steps.
 
         Args:
             line: demanded positions without acceleration, beginning with the present demand.

@@ -22,8 +22,9 @@ _BACK_FROM_PASSIVE: Final = 119
 class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
-    Two rules are not emulated. A receiver does not add 8 to its error counter after a dominant bit
-    that follows its error flag. The warning limit of 96 does not exist, because it is not a state.
+    Two rules are not emulated. In reality, a receiver adds 8 to its error counter after a dominant
+    bit that follows its error flag. In reality, there is also a warning limit of 96, but it is not
+    a state.
 
     Attributes:
         tec: transmit error counter.

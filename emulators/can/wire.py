@@ -187,7 +187,7 @@ class CanWire(Copyable):
         end.segment.force_off(end, self.bus.now_us)
 
     def release(self, end: CanEnd) -> None:
-        """End the bus-off of a node that `force_off` has forced into bus-off.
+        """Let a node recover from the bus-off into which `force_off` has put it.
 
         From then on the node recovers from bus-off automatically, as with most drivers.
 

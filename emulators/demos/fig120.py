@@ -283,7 +283,7 @@ _Fig120Stage = VirtualStage | _BusStage
 def bus_stage(
     arguments: Sequence[str], open_bus: Callable[[], can.BusABC]
 ) -> Iterator[_Fig120Stage]:
-    """Context manager that runs an emulator and opens a bus for a master, both on one real CAN bus.
+    """Context manager in which an emulator and a master run on the same real CAN bus.
 
     Args:
         arguments: arguments of the emulator's command line that select the bus.

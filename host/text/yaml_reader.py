@@ -62,8 +62,8 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
         name: name of the file, for error messages.
 
     Returns:
-        A pair of the tree and the list of errors. The tree is None if the text is empty or cannot
-        be parsed.
+        The tree and all errors, as a pair. The tree is None if the text is empty or cannot be
+        parsed.
     """
     try:
         root = _composed(text)

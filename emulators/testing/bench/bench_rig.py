@@ -91,7 +91,7 @@ class Journal(WireLog):
         ends: tuple[bytes, bytes] = _ENDS,
         splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
-        """Return a function that records both the sent and the received data of a fault.
+        """Return a function that records data before and after a fault has changed them.
 
         Args:
             source: name of the line or node.
@@ -170,9 +170,9 @@ class Journal(WireLog):
     def lines(self) -> tuple[WireLine, ...]:
         """Return the kept lines in order of time.
 
-        The last frame of a line is included even if it is not complete, because only a silence on
-        the line would end it. An action has the time of the next tick of its device. Therefore it
-        may have been added to the journal before frames that end earlier.
+        On some lines a frame ends by a silence. The last frame of such a line is included, although
+        it may not be complete yet. An action has the time of the next tick of its device. Therefore
+        it may have been added to the journal before frames that end earlier.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))

@@ -39,8 +39,8 @@ class LineMount(Copyable):
         line: the line.
         devices: devices by name.
         entries: description of each device for the header of a trace, by name of the device.
-        tap: traffic as the first device sends and receives it, that is, changed by faults of the
-            line.
+        tap: object that reports the traffic at the first device's end of the line. It reports sent
+            traffic as it is after the faults of the line.
     """
 
     def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:

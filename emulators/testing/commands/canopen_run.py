@@ -327,7 +327,8 @@ def read_rig(path: Path) -> _RigNodes:
 
     Raises:
         Refused: the file cannot be read or has errors. The same exception is raised if the file has
-            several buses, or contents other than CANopen nodes.
+            several wires, serial devices, signals or scheduled faults, because this command runs
+            only nodes on one bus.
     """
     try:
         if is_bus_file(path.read_bytes()):

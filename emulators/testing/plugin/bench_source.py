@@ -215,7 +215,7 @@ def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
 
 
 def allowed_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names that a test gives to its markers `allows`, such as `LOST`.
+    """Return the names that a test gives to its markers `allows`, such as `lost`.
 
     Raises:
         ValueError: a name is unknown.

@@ -96,9 +96,9 @@ def _raiser(error: BaseException) -> str:
 def end_at_caller(error: BaseException) -> None:
     """Shorten a traceback, so that it ends at the line of the user that called tickrig.
 
-    The traceback is shortened if tickrig has refused a call, or if a host waits endlessly. The
-    exception may also come from a function of the user that tickrig has called, such as a
-    condition. Then only tickrig's frames between the test and this function are removed.
+    The traceback is shortened in this way if tickrig has refused a call, or if a host waits
+    endlessly. The exception may also come from a function of the user that tickrig has called, such
+    as a condition. Then only tickrig's frames between the test and this function are removed.
 
     Args:
         error: the exception of the test.

@@ -78,7 +78,7 @@ def _remote(can_id: int, extended: bool, length: int) -> CanFrame:
 def waits(tick_us: int) -> st.SearchStrategy[int]:
     """Return a Hypothesis strategy for the duration of a wait in microseconds.
 
-    Most durations are near a multiple of the tick. The longest are some seconds.
+    Most durations are near a multiple of the tick. The longest duration is 1.5 s.
 
     Args:
         tick_us: period of the device in microseconds.

@@ -385,9 +385,8 @@ def check_report(path: Path) -> None:
         path: path of the report.
 
     Raises:
-        ValueError: the report cannot be written at this path. For example, Jinja2 is not installed,
-            the folder does not exist or is not writable, the path is a folder, or the suffix of the
-            file is wrong.
+        ValueError: the report cannot be written, because Jinja2 is not installed, the folder does
+            not exist or is not writable, the path is a folder, or the suffix of the file is wrong.
     """
     if path.suffix.lower() not in (*_PAGES, _JSON) and not is_special(path):
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")

@@ -229,7 +229,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return a reason if a failed test is not valid, because the bench was too slow, or ""."""
+        """Return a message if the bench was too slow to judge a failed test, otherwise ""."""
 
     def hung(self) -> str:
         """Return an error message if a host has waited endlessly, otherwise ""."""

@@ -211,8 +211,8 @@ class _HumanOperator:
     def get(self, name: str) -> Setting:
         """Return the value of an input or output of a real device.
 
-        The value of an input is the value that was last set. The value of an output is asked from
-        the human.
+        The value of an input is the value that was last set. For the value of an output, the human
+        is asked.
         """
         if name in self._physical.inputs.table:
             return self._physical.inputs[name]
@@ -624,7 +624,7 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Ask a human whether something is observed; return the answer, or None without human.
+        """Return a human's answer whether something is observed, or None if there is no human.
 
         Args:
             owner: name of the device whose operator is asked, or empty for the first device with a

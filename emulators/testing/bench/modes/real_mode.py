@@ -372,7 +372,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return a reason if a failed test is not valid, because the bench was too slow, or ""."""
+        """Return a message if the bench was too slow to judge a failed test, otherwise ""."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us
