@@ -319,7 +319,7 @@ class Survey(NodeBoard):
         row = None if node is None else self.row(channel, node)
         told_us, late = (None, 0) if row is None else (row.heartbeats.last_us, row.late)
         if row and kind == "boot-up":
-            late -= row.is_late(record.at_us)  # the board counts a late heartbeat alone
+            late -= row.is_late(record.at_us)  # the board does not count it after a reset
         super().take(record, decoded)
         if row and told_us is not None and row.late > late:
             self._gap(channel, row.node, told_us, record.at_us)

@@ -12,6 +12,7 @@ from tickrig.host.canmon.model.decode.filter import Test, signal_place, signal_r
 from tickrig.host.canmon.model.frames import ERROR, AnyRecord, Record, any_ident, ms_text
 from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.canopen import nmt
 from tickrig.wire.instant import NEVER
 
 # The events of a rule.
@@ -138,6 +139,7 @@ class RuleEvent:
             None if the filter consists of signals, or of parts joined by `or`.
         alone: test of the parts without signals, in a filter that joins them with signals by `or`,
             as in `emcy or statusword.fault`, otherwise None.
+        is_id: whether the filter consists only of CAN-IDs.
     """
 
     text: str
@@ -147,6 +149,7 @@ class RuleEvent:
     has_node: bool = False
     at_frames: AtFrames | None = None
     alone: Test | None = None
+    is_id: bool = False
 
     def carriers(self) -> Callable[[Decoded], bool]:
         """Return a function that returns whether a frame contains one of the named signals."""
@@ -528,10 +531,16 @@ class Toggle(RuleDemand):
 # Demands on the time of frames.
 
 
+_RESTARTS: Final = ("boot-up", "nmt")
+_RESETS: Final = (nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION)
+
+
 class Every(RuleDemand):
     """Demand that limits the time between two successive frames of the same CAN-ID.
 
-    The time before the first frame after a boot-up is not judged.
+    If the event consists of CAN-IDs, all times between its frames are judged. Otherwise the time
+    from a boot-up of the node to its next frame is not judged. The time from the last frame to the
+    boot-up must not be too long, except if an NMT command has reset the node.
 
     Args:
         event: event that selects the frames to judge.
@@ -545,6 +554,7 @@ class Every(RuleDemand):
         self._event, self._low_us, self._high_us = event, low_us, high_us
         self.doubt = f"{event.text} did not come twice from one sender while it was in force"
         self._last: dict[_Sender, tuple[int, int | None]] = {}
+        self._reset: set[_Sender] = set()  # nodes that an NMT command has reset, by bus
 
     def begin(self, at_us: int) -> None:
         """Measure the time from the next frame."""
@@ -552,16 +562,17 @@ class Every(RuleDemand):
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the time since the previous frame."""
-        if decoded.kind == "boot-up":
-            self._forget(record.channel, decoded.node)
+        said = None
+        if decoded.kind in _RESTARTS and not self._event.is_id:
+            said = self._restart(record, decoded)
         if not self._event.matches(record, decoded):
-            return None
+            return said
         self.came = True
         sender = _sender_of(record)
         before = self._last.get(sender)
         self._last[sender] = record.at_us, decoded.node
         if before is None:
-            return None
+            return said
         self.judged = True
         gap_us = max(0, record.at_us - before[0])
         return self._wrong(gap_us, decoded.node, "after the one before")
@@ -576,9 +587,25 @@ class Every(RuleDemand):
             if end_us - at_us > self._high_us:
                 yield self._wrong(end_us - at_us, node, "without another") or ""
 
-    def _forget(self, channel: str, node: int | None) -> None:
+    def _restart(self, record: Record, decoded: Decoded) -> str | None:
+        """Process an NMT command or a boot-up. A boot-up without a reset ends a silence."""
+        channel, node = record.channel, decoded.node
+        if decoded.kind == "nmt":
+            if decoded.signals and decoded.signals[0].value in _RESETS:
+                nodes = range(1, 0x80) if node is None else (node,)
+                self._reset |= {(channel, one) for one in nodes}
+            return None
         last = self._last.items()
+        ended = [one for key, one in last if (key[0], one[1]) == (channel, node)]
         self._last = {key: one for key, one in last if (key[0], one[1]) != (channel, node)}
+        if node is None or (channel, node) in self._reset:
+            self._reset.discard((channel, node or 0))
+            return None
+        self.judged |= bool(ended) and self._high_us is not None
+        silent_us = [record.at_us - at_us for at_us, _ in ended]
+        late = [us for us in silent_us if self._high_us is not None and us > self._high_us]
+        said = (self._wrong(us, node, "without another before the boot-up") for us in late)
+        return "; ".join(filter(None, said)) or None
 
     def _wrong(self, gap_us: int, node: int | None, how: str) -> str | None:
         high_us = self._high_us

@@ -36,7 +36,8 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import chain, pairwise
+from itertools import chain, islice, pairwise
+from operator import attrgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -121,6 +122,8 @@ _MOST_STATES: Final = 64
 """Number of values of a statusword above which an object is no statusword."""
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
+_STOPS: Final = 2
+"""Number of periods without a TPDO before a boot-up of its node that mean that it is missing."""
 _STOPPED: Final = 5
 _STOPPED_US: Final = 250_000
 """Number of periods, and duration, without frames at the end of a log that mean a stop."""
@@ -588,6 +591,36 @@ class _BusJudge:
                 text = f"{name} stops {ms_text(self._end_us - last_us)} ms before the end, its"
                 text += f" period is {ms_text(period)}"
                 self._hit(f"{kind}-missing", ident, text, [piece[-1]])
+            elif kind == "pdo":
+                self._until_boot(ident, piece, rhythm)
+
+    def _until_boot(self, ident: int, piece: Sequence[int], rhythm: cycles.Rhythm) -> None:
+        """Find a TPDO that stops because its node restarts without an NMT reset.
+
+        Another event before the boot-up, such as an NMT command, may end the TPDO on purpose.
+        """
+        node, rows = ident & node_events.NODE_MASK, self._rows[ident]
+        one = self._events.nodes.get(node)
+        if one is None or (ident >> 7) % 2 == 0:
+            return
+        last, times = int(piece[-1]), self._times
+        at = bisect_right(rows, last)
+        end = int(rows[at]) if at < len(rows) else len(self._bus)
+        begin = bisect_right(one.restarts, last, key=_row_of)
+        behind = islice(one.restarts, begin, bisect_left(one.restarts, end, key=_row_of))
+        boot = next((found for found in behind if found.kind == "boot"), None)
+        if boot is None:
+            return
+        last_us, period = int(times[last]), rhythm.levels[-1].period_us
+        cuts = self._cuts_of(ident)
+        gap_us = min(boot.at_us, *cuts[bisect_right(cuts, last_us) :][:1]) - last_us
+        if gap_us > max(_STOPS * period, period + 4 * rhythm.spread_us) and not self._is_silent(
+            ident, last_us, last_us + gap_us, period
+        ):
+            text = f"{_name(ident)} does not come for {ms_text(gap_us)} ms before the boot-up of"
+            text += f" its node, its period is {ms_text(period)}"
+            shown = [last, boot.row]
+            self._hit("pdo-missing", ident, text, shown, max(1, round(gap_us / period) - 1))
 
     def _is_silent(self, ident: int, begin: int, end: int, period: int) -> bool:
         """Return whether the whole bus is silent in a gap. Record the silence."""
@@ -626,6 +659,13 @@ class _BusJudge:
                     self._lost(ident, end - begin, says, piece[at : at + 2], n)
             if piece is pieces[-1] and self._end_us - times[-1] > _LOST_AFTER * period:
                 self._lost(ident, self._end_us - times[-1], says, piece[-1:], 1)
+            elif (until := _next_restart(one, rows, piece[-1])) is not None:
+                gap_us = until.at_us - times[-1]
+                if gap_us > _LOST_AFTER * period and not self._is_silent(
+                    ident, times[-1], until.at_us, period
+                ):
+                    n = max(1, round(gap_us / period) - 1)
+                    self._lost(ident, gap_us, says, [piece[-1], until.row], n)
 
     def _few_beats(
         self, node: int, times: Sequence[int]
@@ -856,6 +896,22 @@ class _BusJudge:
             sum(hit.amount for hit in hits),
             tuple(self._bus.place(row) for row in rows[: learnt.KEPT_FRAMES]),
         )
+
+
+_row_of: Final = attrgetter("row")
+
+
+def _next_restart(
+    one: node_events.NodeEvents, heartbeats: Sequence[int], last: int
+) -> node_events.Restart | None:
+    """Return the event before the next heartbeat up to which a node should have sent heartbeats."""
+    at = bisect_right(heartbeats, last)
+    end = heartbeats[at] if at < len(heartbeats) else None
+    place = bisect_right(one.restarts, last, key=_row_of)
+    found = one.restarts[place] if place < len(one.restarts) else None
+    if found is None or found.kind == "excuse" or (end is not None and found.row > end):
+        return None
+    return found
 
 
 def _rows_but(parts: Iterable[Any], but: Any) -> Any:

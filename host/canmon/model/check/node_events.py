@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
 from tickrig.host.canmon.model.decode import decoded
@@ -45,6 +46,10 @@ _SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
 _HEARTBEAT_TIME: Final = 0x1017
 IDENTITY: Final = 0x1018
 _TOGGLE_ABORT: Final = 0x0503_0000
+_SENT: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
+"""Frames that a node sends by the pre-defined connection set, as COB-IDs without the node-ID."""
+SILENT: Final = ", silent for "
+"""Beginning of the part of a text that says how long a node was silent before its boot-up."""
 
 RULES: Final = {
     "no-error-frames": "error frames",
@@ -76,6 +81,22 @@ class Cut(NamedTuple):
     node: int
 
 
+class Restart(NamedTuple):
+    """An event after which the heartbeats of a node begin again.
+
+    Attributes:
+        at_us: time of the event in microseconds.
+        row: row of the event.
+        kind: what it is. Up to a boot-up without an NMT reset (`boot`), and up to an NMT reset or a
+            write to 1017h (`order`), the node should have sent its heartbeats. A boot-up after a
+            reset excuses their absence (`excuse`).
+    """
+
+    at_us: int
+    row: int
+    kind: Literal["boot", "order", "excuse"]
+
+
 @dataclass(slots=True)
 class NodeEvents:
     """Events of one node in a log, such as its heartbeats, guarding answers and boot-ups.
@@ -88,6 +109,7 @@ class NodeEvents:
         answers: rows of error control frames that a remote frame requested (node guarding).
         requested: rows of the remote frames that request the state of the node.
         boots: rows of boot-ups.
+        restarts: boot-ups, NMT resets, and writes to 1017h, in the order of their rows.
         toggled: whether any error control frame had the toggle bit set.
         state: NMT state that the node reported last, or None before its first report.
         identity: values that were read from 1018h, by sub-index, each with the row of its first
@@ -98,6 +120,7 @@ class NodeEvents:
     answers: list[int] = field(default_factory=list)
     requested: list[int] = field(default_factory=list)
     boots: list[int] = field(default_factory=list)
+    restarts: list[Restart] = field(default_factory=list)
     toggled: bool = False
     state: int | None = None
     command: tuple[int, int, int] | None = None  # when, the state that it wants, its row
@@ -195,7 +218,8 @@ class BusEvents:
         self.hits: list[Hit] = []
         self.cuts: list[Cut] = []
         self.commanded = any(ident == nmt.NMT_COB_ID for ident in rows)
-        self._first = first_rows(rows)
+        self._first, self._rows = first_rows(rows), rows
+        self._reset: set[int] = set()  # of nodes without events before an NMT reset of all nodes
         self._requests: dict[tuple[int, int], int] = {}
         self._silent: list[tuple[int, str, int]] = []
         self._wrong_toggles: dict[int, int] = {}  # first row in the transfer of a node
@@ -263,6 +287,8 @@ class BusEvents:
 
     def _command(self, at_us: int, command: int, target: int) -> None:
         nodes = list(self.nodes) if target == nmt.ALL_NODES else [target]
+        if command in _RESETS and target == nmt.ALL_NODES:
+            self._reset |= self._first.keys() - self.nodes.keys()
         self.cuts.append(Cut(at_us, target))
         if command == nmt.NmtCommand.STOP:
             whom = "all nodes" if target == nmt.ALL_NODES else f"node {target}"
@@ -271,6 +297,7 @@ class BusEvents:
             one = self.nodes[node]
             if command in _RESETS:
                 one.reset, one.command = True, None
+                one.restarts.append(Restart(at_us, self._row, "order"))
             else:
                 one.command, one.told_since = (at_us, nmt.COMMANDED[command], self._row), 0
 
@@ -294,16 +321,28 @@ class BusEvents:
 
     def _boot(self, at_us: int, node: int, one: NodeEvents) -> None:
         heard = self._first.get(node, self._row) < self._row
+        expected = one.reset or node in self._reset
+        self._reset.discard(node)
+        one.restarts.append(Restart(at_us, self._row, "excuse" if expected else "boot"))
         since_us = at_us - int(self._times[one.boots[-1]]) if one.boots else None
-        if heard and not one.reset:
+        if heard and not expected:
             if not self._untimed and since_us is not None and since_us <= PAIR_US:
                 said = f"two boot-ups within {ms_text(since_us)} ms: two nodes have this node-ID"
                 self._control_hit("doubled-node", node, said)
             else:
-                self._control_hit("no-reboot", node, "boots again without an NMT reset")
+                silent_us = 0 if self._untimed else at_us - self._heard_us(node)
+                silent = f"{SILENT}{ms_text(silent_us)} ms before" if silent_us > 0 else ""
+                self._control_hit("no-reboot", node, f"boots again without an NMT reset{silent}")
         one.boots.append(self._row)
         one.reset, one.state, one.command = False, int(nmt.NmtState.INITIALISING), None
         self.cuts.append(Cut(at_us, node))
+
+    def _heard_us(self, node: int) -> int:
+        """Return the time of the last frame of a node before the current one."""
+        sent = [found for base in _SENT if (found := self._rows.get(base + node)) is not None]
+        before = [bisect_left(found, self._row) for found in sent]
+        rows = [int(found[at - 1]) for found, at in zip(sent, before, strict=True) if at]
+        return int(self._times[max(rows, default=self._row)])
 
     def _state(self, at_us: int, node: int, one: NodeEvents, state: int) -> None:
         before, one.state = one.state, state
@@ -409,6 +448,8 @@ class BusEvents:
         ):
             if entry[0] in _PDO_PARAMETERS or entry[0] == _HEARTBEAT_TIME:
                 self.cuts.append(Cut(at_us, node))
+                if entry[0] == _HEARTBEAT_TIME:
+                    self.nodes[node].restarts.append(Restart(at_us, self._row, "order"))
             elif entry[0] in _SYNC_PARAMETERS:
                 self.cuts.append(Cut(at_us, 0))
 

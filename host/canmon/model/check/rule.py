@@ -268,6 +268,28 @@ _BOOT_UP: Final = bytes([nmt.NmtState.INITIALISING])
 _ERROR_CONTROL_IDS: Final = range(nmt.ERROR_CONTROL_COB_ID + 1, nmt.ERROR_CONTROL_COB_ID + 0x80)
 _ANSWER_IDS: Final = range(sdo_frame.RESPONSE_COB_ID + 1, sdo_frame.RESPONSE_COB_ID + 0x80)
 _REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_ID + 0x80)
+_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
+
+
+class _Resets:
+    """NMT resets of nodes that have not booted since. A reset explains why a node is silent."""
+
+    def __init__(self) -> None:
+        self._at_us: dict[tuple[str, int], int] = {}
+
+    def take(self, record: Record) -> None:
+        """Process an NMT command."""
+        frame = record.frame
+        assert isinstance(frame, CanFrame)
+        if len(frame.data) != 2 or frame.data[0] not in _RESETS:
+            return
+        target = frame.data[1]
+        for node in range(1, 0x80) if target == nmt.ALL_NODES else (target,):
+            self._at_us.setdefault((record.channel, node), record.at_us)
+
+    def ended(self, record: Record, node: int) -> int | None:
+        """Return the time of the reset that a boot-up follows, or None if there was no reset."""
+        return self._at_us.pop((record.channel, node), None)
 
 
 class HeartbeatTimes(NamedTuple):
@@ -287,7 +309,8 @@ class HeartbeatTimes(NamedTuple):
 class Heartbeat(Rule):
     """Rule that the heartbeats of one node arrive neither too early nor too late.
 
-    The first heartbeat after a boot-up may arrive at any time.
+    The first heartbeat after a boot-up may arrive at any time. The time before a boot-up counts up
+    to the NMT reset of the node, or up to the boot-up if no NMT command has reset the node.
 
     Args:
         times: node-ID, and limits of the time between two heartbeats.
@@ -301,43 +324,65 @@ class Heartbeat(Rule):
         self.name = f"heartbeat {times.node}"
         self._booted_us: dict[str, int] = {}
         self._free: Counter[str] = Counter()
+        self._resets = _Resets()
 
     def wants(self, ident: int, /) -> bool:
-        """Return whether the identifier is the COB-ID of the heartbeat."""
-        return ident == self._ident
+        """Return whether the identifier is that of the heartbeat, or of NMT commands."""
+        return ident in (self._ident, nmt.NMT_COB_ID)
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Select frames that arrive too early or too late, and boot-ups."""
+        """Select frames that arrive too early or too late, boot-ups, and resets."""
+        if ident == nmt.NMT_COB_ID:
+            return FrameSelection(first_bytes=_RESETS)
         _, low_us, high_us = self._times
         return FrameSelection(low_us, high_us, frozenset(_BOOT_UP), firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Compare the gap, unless the frame or the previous frame is a boot-up."""
+        """Compare the gap, unless the previous frame is a boot-up."""
+        frame = record.frame
+        assert isinstance(frame, CanFrame)
+        if frame.can_id == nmt.NMT_COB_ID:
+            self._resets.take(record)
+            return None
         booted_us = self._booted_us.get(record.channel)
         behind_boot = gap_us is not None and record.at_us - gap_us == booted_us
-        if record.frame.data[:1] == _BOOT_UP:
-            self._booted_us[record.channel] = record.at_us
-            self._free[record.channel] += 2 - (gap_us is None or behind_boot)
-            return None
-        if not record.frame.data:
+        if frame.data[:1] == _BOOT_UP:
+            return self._boot(record, None if behind_boot else gap_us)
+        if not frame.data:
             return f"node {self._times.node}: heartbeat of 0 B, 1 is right"
         if gap_us is None or behind_boot:
             return None
-        if gap_us > self._times.high_us:
-            return self._said(gap_us, "at most", self._times.high_us)
         if gap_us < self._times.low_us:
             return self._said(gap_us, "at least", self._times.low_us)
-        return None
+        return self._late(gap_us)
+
+    def _boot(self, record: Record, gap_us: int | None) -> str | None:
+        """Compare the gap before a boot-up, which is None if it does not count."""
+        reset_us = self._resets.ended(record, self._times.node)
+        self._booted_us[record.channel] = record.at_us
+        self._free[record.channel] += 1 + (gap_us is not None and reset_us is not None)
+        if gap_us is None:
+            return None
+        if reset_us is not None:
+            gap_us -= record.at_us - reset_us
+        return self._late(gap_us)
+
+    def _late(self, gap_us: int) -> str | None:
+        high_us = self._times.high_us
+        return self._said(gap_us, "at most", high_us) if gap_us > high_us else None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Report that the heartbeat stopped or never arrived."""
         if self._ident not in latest_us:
             yield f"no heartbeat of node {self._times.node} came"
-        elif end_us - latest_us[self._ident] > self._times.high_us:
-            yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
+        elif (text := self._late(end_us - latest_us[self._ident])) is not None:
+            yield text
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Report that there was no gap to compare. Gaps around boot-ups do not count."""
+        """Report that there was no gap to compare.
+
+        The gap after a boot-up does not count, and the gap before it only without a reset.
+        """
         if evidence.untimed:
             return ONE_TIME
         gaps = 0
@@ -395,15 +440,39 @@ class _Watched:
         self._doubted: str | None = None  # lost by the EDS alone, if the next gap agrees with it
         self.has_sent = self.guarded = self.requested = self.judged = False
 
-    def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
-        """Store values of the node's objects that SDO traffic contains."""
+    def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> str | None:
+        """Store values of the node's objects that SDO traffic contains.
+
+        The result is a description as from `hear`, if the node was silent before its 1017h was
+        written.
+        """
         step = (self._sdo.request if request else self._sdo.response)(at_us, data)
+        said = None
         for transfer in step.ended:
-            if self._memory.learn(transfer) and transfer.entry == self._heartbeat_time:
+            is_beat = transfer.entry == self._heartbeat_time
+            late = self._surely_overdue(at_us) if is_beat else None
+            if self._memory.learn(transfer) and is_beat:
                 self._heartbeats.learn(at_us, transfer)
+                said = said or (late if self._heartbeats.since_us == at_us else None)
+        return said
+
+    def boot(self, at_us: int, reset_us: int | None) -> str | None:
+        """Process a boot-up of the node, and return a description as `hear` does.
+
+        Args:
+            at_us: time of the boot-up in microseconds.
+            reset_us: time of the NMT reset that explains the boot-up, or None without a reset.
+        """
+        said = self._surely_overdue(at_us if reset_us is None else reset_us)
+        self._memory.boot()
+        self._heartbeats.boot(at_us)
+        self.has_sent = True
+        self.guarded = self.requested = False
+        self._doubted = None
+        return said
 
     def hear(self, at_us: int, data: bytes) -> str | None:
-        """Process an error control frame of the node.
+        """Process an error control frame of the node, except a boot-up.
 
         The result is a description of the violation if a heartbeat before this frame was lost,
         otherwise None.
@@ -413,12 +482,6 @@ class _Watched:
             data: data bytes of the frame.
         """
         self.has_sent = True
-        if data[:1] == _BOOT_UP:
-            self._memory.boot()
-            self._heartbeats.boot(at_us)
-            self.guarded = self.requested = False
-            self._doubted = None
-            return None
         self.guarded |= bool(data and data[0] & _GUARD_TOGGLE)
         said = self._lost_before(at_us)
         self._heartbeats.take(at_us, learns=not self.requested)
@@ -439,6 +502,11 @@ class _Watched:
             _LOST_AFTER * self._eds_us
         )
         return doubted if keeps_eds else None
+
+    def _surely_overdue(self, at_us: int) -> str | None:
+        """Return a finding as `overdue` does, unless only an EDS gives the period, or one gap."""
+        beats = self._heartbeats
+        return self.overdue(at_us) if beats.by_sdo or len(beats.gaps) >= _SURE_GAPS else None
 
     def overdue(self, at_us: int) -> str | None:
         """Return a finding if the heartbeat of the node is lost at this time."""
@@ -473,7 +541,9 @@ class NoLostHeartbeat(Rule):
     """Rule that a node which sends heartbeats does not omit any.
 
     The expected period comes from 1017h in SDO traffic. If 1017h was not transferred, the measured
-    period is used, or otherwise the value from an EDS file. A boot-up restarts the supervision.
+    period is used, or otherwise the value from an EDS file. A boot-up restarts the supervision. The
+    time before it counts up to the NMT reset of the node, or up to the boot-up if no NMT command
+    has reset the node.
     Answers to node guarding requests, which have a toggle bit, do not count as heartbeats.
 
     Args:
@@ -486,18 +556,24 @@ class NoLostHeartbeat(Rule):
     def __init__(self, periods_ms: Mapping[int, int]) -> None:
         self._periods_ms = {node: ms for node, ms in periods_ms.items() if ms}
         self._nodes: dict[tuple[str, int], _Watched] = {}
+        self._resets = _Resets()
         self._begin_us: int | None = None
 
     def wants(self, ident: int, /) -> bool:
         """Return whether the rule must see the frames of a CAN-ID.
 
-        These are error control frames and SDO frames, because an SDO transfer may contain 1017h.
+        These are error control frames, SDO frames, because an SDO transfer may contain 1017h, and
+        NMT commands, because they reset nodes.
 
         Args:
             ident: CAN-ID with flags.
         """
         is_sdo = ident in _ANSWER_IDS or ident in _REQUEST_IDS
-        return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS
+        return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS or ident == nmt.NMT_COB_ID
+
+    def selection(self, ident: int, /) -> FrameSelection:
+        """Select all frames of nodes, and resets."""
+        return FrameSelection(first_bytes=_RESETS if ident == nmt.NMT_COB_ID else frozenset())
 
     def begin(self, at_us: int, /) -> None:
         """Record the start of listening."""
@@ -507,11 +583,18 @@ class NoLostHeartbeat(Rule):
         """Compare the gap with the period."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        node = self._watched(record.channel, frame.can_id & _NODE_MASK)
+        if frame.can_id == nmt.NMT_COB_ID:
+            self._resets.take(record)
+            return None
+        node_id = frame.can_id & _NODE_MASK
+        node = self._watched(record.channel, node_id)
         if frame.can_id not in _ERROR_CONTROL_IDS:
-            node.take_sdo(record.at_us, frame.data, request=frame.can_id in _REQUEST_IDS)
-        elif frame.remote:
+            is_request = frame.can_id in _REQUEST_IDS
+            return node.take_sdo(record.at_us, frame.data, request=is_request)
+        if frame.remote:
             node.requested = True
+        elif frame.data[:1] == _BOOT_UP:
+            return node.boot(record.at_us, self._resets.ended(record, node_id))
         else:
             return node.hear(record.at_us, frame.data)
         return None
@@ -743,9 +826,6 @@ class KnownIds(Rule):
 def _text(record: Record) -> str:
     assert not isinstance(record.frame, ErrorFrame)
     return ident_text(any_ident(record.frame))
-
-
-_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
 
 
 class NodesPresent(Rule):

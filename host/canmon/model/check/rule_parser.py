@@ -553,6 +553,7 @@ Other demands distinguish the nodes.
 """
 
 _NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
+_ID_WORD: Final = re.compile(r"[0-9A-Fa-f]{3}(?:[0-9A-Fa-f]{5})?(?:-[0-9A-Fa-f]{3,8})?|id|==?|or|,")
 _OF: Final = re.compile(r"(?<!\s)\s++of\s")
 _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
@@ -663,7 +664,8 @@ class _RuleParser(_QuantityParser):
                 at_frames.select(*[errors] * (errors is not every))
             test = at_frames or errors_alone(test, taken, paths)
             alone = alone and errors_alone(alone, taken, paths)
-        return demands.RuleEvent(text, test, paths, is_signal, has_node, at_frames, alone)
+        is_id = all(_ID_WORD.fullmatch(word) for word in words)
+        return demands.RuleEvent(text, test, paths, is_signal, has_node, at_frames, alone, is_id)
 
     def _condition(self) -> demands.RuleEvent:
         return self._with_signals(self._event(), "while")

@@ -81,7 +81,8 @@ class NodeStatus:
         boots: number of boot-up messages.
         unrequested_boots: number of boot-ups without an NMT command that follow an earlier frame of
             the node.
-        late: gaps between heartbeats that were longer than `LATE` periods.
+        late: gaps between heartbeats that were longer than `LATE` periods, and such gaps before a
+            boot-up without an NMT command.
         emcys: latest EMCY messages. The oldest is first.
         emcy_count: number of all EMCY messages.
         error_code: error code of the latest EMCY, or 0 if it cleared an error.
@@ -163,6 +164,7 @@ class NodeStatus:
         if self._booted_us is not None and not self._reset_requested:
             self.doubled |= 0 <= at_us - self._booted_us <= PAIR_US
         self._booted_us = at_us
+        self.late += not self._reset_requested and self.is_late(at_us)
         self._beats_us.clear()
         self._each_us = self._alike = 0
         self.unrequested_boots += self.present and not self._reset_requested

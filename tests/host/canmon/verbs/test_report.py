@@ -131,6 +131,22 @@ def test_two_nodes_with_one_id_miss_no_heartbeat(joins: int, tmp_path: Path) -> 
     assert node["cells"][4] == "from two nodes"
 
 
+@pytest.mark.parametrize(("reset", "lost"), [("000#8111", 0), ("000#8112", 1), ("000#0111", 1)])
+def test_a_node_that_boots_by_itself_shows_its_silence(
+    reset: str, lost: int, tmp_path: Path
+) -> None:
+    beats = [(n * 100_000, "711#05") for n in range(60) if not 20 <= n < 30]
+    others = [(n * 100_000 + 1_000, "712#05") for n in range(60)]
+    boot = [(1_950_000, reset), (2_910_000, "711#00")]
+    data = page_of(tmp_path / "run.log", [*beats, *others, *boot])
+    node, other = data["nodes"]
+    assert [mark[:2] for mark in node["gaps"]] == [[1_900_000, 1_010_000]] * lost
+    assert other["gaps"] == []
+    assert [one["at"] for one in data["findings"] if one["rule"] == "no-lost-heartbeat"] == [
+        [1_900_000, 2_910_000]
+    ] * lost
+
+
 def test_a_node_that_is_guarded_keeps_its_gaps(tmp_path: Path) -> None:
     asked = [(n * 100_000, "711#R") for n in range(60)]
     told = [

@@ -60,9 +60,12 @@ def test_a_log_in_blocks_has_the_same_findings_as_frame_by_frame(
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from([0, 79_999, 100_000, 120_001]),
+            st.sampled_from([0, 79_999, 100_000, 120_001, 500_000]),
             st.sampled_from(
-                ["703#00", "703#05", "703#", "703#85", "703#R", "000#8103", "000#8200", *WRITTEN]
+                [
+                    *("703#00", "703#05", "703#", "703#85", "703#R", "000#8103", "000#8200"),
+                    *("709#00", "000#8109", "000#0103", *WRITTEN),
+                ]
             ),
         ),
         max_size=30,

@@ -130,6 +130,95 @@ def test_a_heartbeat_that_is_left_out_is_found() -> None:
     assert [place.number for place in fault.frames] == [9, 10]
 
 
+# A node that loses its power, and a node that is reset.
+
+BEGIN_US, BACK_US = 1_645_000, 2_345_000
+
+
+def outage(*nodes: int, between: Sequence[tuple[int, str]] = ()) -> list[Record]:
+    """Return a sound log in which nodes send nothing for 0.7 s, and boot then."""
+    idents = {base + node for node in nodes for base in (0x180, 0x580, 0x600, 0x700)}
+    left = [
+        one
+        for one in sound()
+        if not BEGIN_US <= one.at_us < BACK_US or frame_of(one).can_id not in idents
+    ]
+    for at_us, text in between:
+        left = put(left, at_us, text)
+    return put(left, BACK_US, *(f"7{node:02X}#00" for node in nodes))
+
+
+def found_in(records: list[Record]) -> dict[tuple[str, int | None], str]:
+    """Return the findings by rule and node."""
+    return {(one.rule, one.node): one.text for one in diagnose([records]).faults}
+
+
+@pytest.mark.usefixtures("both_ways")
+@pytest.mark.parametrize("between", [[], [(1_800_000, "000#8110"), (1_900_000, "000#0105")]])
+def test_a_node_that_boots_by_itself_was_lost_before(between: list[tuple[int, str]]) -> None:
+    found = found_in(outage(5, between=between))
+    assert found.keys() == {(rule, 5) for rule in ("no-lost-heartbeat", "pdo-missing", "no-reboot")}
+    assert found["no-lost-heartbeat", 5].startswith("no heartbeat for 7")
+    last = "2" if between else "7"
+    assert found["pdo-missing", 5].startswith(f"TPDO1 (185) does not come for {last}")
+    assert found["no-reboot", 5].startswith("boots again without an NMT reset, silent for 7")
+
+
+@pytest.mark.usefixtures("both_ways")
+@pytest.mark.parametrize("reset", [(1_645_000, "000#8105"), (1_646_000, "000#8200")])
+def test_a_node_that_is_reset_was_not_lost(reset: tuple[int, str]) -> None:
+    assert found_in(outage(5, between=[reset])) == {}
+
+
+@pytest.mark.usefixtures("both_ways")
+def test_a_node_that_is_reset_because_it_is_silent_was_lost() -> None:
+    found = found_in(outage(5, between=[(2_245_000, "000#8105")]))
+    assert found.keys() == {("no-lost-heartbeat", 5)}
+    assert found["no-lost-heartbeat", 5].startswith("no heartbeat for 6")
+
+
+@pytest.mark.usefixtures("both_ways")
+def test_a_node_that_is_silent_before_its_1017h_is_written_was_lost() -> None:
+    records = outage(17)
+    records = without(records, *places(records, 0x711, "00")[1:])
+    records = put(records, BACK_US, "611#2B17100064000000", "591#6017100000000000")
+    assert found_in(records).keys() == {("no-lost-heartbeat", 17)}
+
+
+@pytest.mark.usefixtures("both_ways")
+def test_a_bus_that_is_switched_off_and_on_is_silent_once() -> None:
+    records = [one for one in sound() if not BEGIN_US <= one.at_us < BACK_US]
+    records = put(records, BACK_US, *(f"7{node:02X}#00" for node in (5, 6, 16, 17)))
+    found = found_in(records)
+    assert found.keys() == {("silence", None), *(("no-reboot", node) for node in (5, 6, 16, 17))}
+    assert "where 7 CAN-IDs should come" in found["silence", None]
+
+
+def test_a_node_that_is_switched_on_later_was_not_lost() -> None:
+    assert found_in([one for one in outage(5) if not is_of(one, 5) or one.at_us >= BACK_US]) == {}
+
+
+def is_of(record: Record, node: int) -> bool:
+    """Return whether a frame is of a node."""
+    return frame_of(record).can_id in {base + node for base in (0x080, 0x180, 0x580, 0x600, 0x700)}
+
+
+def test_a_reset_of_all_excuses_a_node_that_sent_only_pdos() -> None:
+    found = found_in(lines("185#00 185#00 706#05 000#8100 705#00 706#00 705#05 706#05"))
+    assert found == {}
+
+
+def test_a_boot_up_that_is_usual_stays_usual() -> None:
+    one = Diagnoser()
+    one.take(faulty("boot-up"))
+    rules = learnt.parse_learnt(learnt.learnt_text(one.summaries(), []))
+    assert rules is not None
+    assert rules["can0"].usual == {"no-reboot: node 17: boots again without an NMT reset"}
+    other = Diagnoser(rules=rules)
+    other.take(put(list(sound()), 2_060_000, "711#00"))
+    assert other.diagnosis().faults == ()
+
+
 def lines(text: str, step_us: int = 1_000) -> list[Record]:
     """Return frames, one each millisecond."""
     return [

@@ -107,8 +107,43 @@ def test_a_late_and_an_early_heartbeat_are_found() -> None:
     ]
 
 
-def test_the_times_around_a_boot_up_are_free() -> None:
-    assert broken(HEARTBEAT, "1 703#05\n1.5 703#00\n1.9 703#7F\n2.0 703#7F") == []
+@pytest.mark.parametrize("reset", ["0.9 000#8103\n1 703#05", "1 703#05\n1.1 000#8200"])
+def test_the_times_around_a_boot_up_after_a_reset_are_free(reset: str) -> None:
+    assert broken(HEARTBEAT, f"{reset}\n1.5 703#00\n1.9 703#7F\n2.0 703#7F") == []
+
+
+@pytest.mark.parametrize("other", ["1.1 000#8104\n", "1.1 000#0103\n", "1.1 000#81\n", ""])
+def test_the_time_before_a_boot_up_without_a_reset_counts(other: str) -> None:
+    assert broken(HEARTBEAT, f"1 703#05\n{other}1.5 703#00\n1.9 703#7F\n2.0 703#7F") == [
+        "1.5 node 3: 500.000 ms since its last heartbeat, at most 120.000 is right"
+    ]
+    assert broken(HEARTBEAT, f"1 703#05\n{other}1.12 703#00\n1.9 703#00\n2.0 703#00") == []
+
+
+def test_the_time_before_a_reset_counts() -> None:
+    text = "1 703#05\n1.3 000#8103\n1.4 000#8103\n1.5 703#00\n1.6 703#05"
+    assert broken(HEARTBEAT, text) == [
+        "1.5 node 3: 300.000 ms since its last heartbeat, at most 120.000 is right"
+    ]
+    said = "can0 node 3: no heartbeat for 300.000 ms, one each 100.000 ms before"
+    assert broken(LOST, f"0.8 703#05\n0.9 703#05\n{text}") == [f"1.5 {said}"]
+
+
+def test_a_node_that_resets_itself_loses_its_heartbeats() -> None:
+    beats, boot = "0.8 703#05\n0.9 703#05\n1 703#05\n", "1.5 703#00\n2.5 703#05"
+    said = "1.5 can0 node 3: no heartbeat for 500.000 ms, one each 100.000 ms before"
+    assert broken(LOST, beats + boot) == [said]
+    assert broken(LOST, f"{beats}1.1 000#8104\n1.2 000#0103\n{boot}") == [said]
+    assert broken(LOST, f"{beats}1.1 000#8200\n{boot}") == []
+    assert broken(LOST, f"0.7 000#8103\n{beats}{boot}") == []
+    assert broken(LOST, beats + boot.replace("1.5", "1.15")) == []
+
+
+def test_a_silence_before_1017h_is_written_counts() -> None:
+    text = f"0.3 703#05\n0.4 703#05\n0.5 703#05\n1 {WRITE_1017}\n1.1 703#05"
+    assert broken(LOST, text) == [
+        "1.01 can0 node 3: no heartbeat for 510.000 ms, one each 100.000 ms before"
+    ]
 
 
 def test_a_heartbeat_without_a_state_is_found() -> None:
@@ -298,6 +333,7 @@ def unjudged(rules: Rules, text: str, end_s: float | None = None) -> dict[str, s
     [
         ({"heartbeat": "3=100ms±20%"}, "1 703#05", "1 frame of error control came, and no gap"),
         ({"heartbeat": "3=100ms±20%"}, "1 703#00\n1.1 703#05", "2 frames of error control"),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1 000#8103\n1.1 703#00", "2 frames of error"),
         ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1 703#05\n1 703#05", "all frames have one time"),
         ({"max_gap": "181=20ms"}, "1 181#\n1.01 182#", "181 came once"),
         ({"max_gap": "181=20ms"}, "1 181#\n1 181#", "all frames have one time"),
@@ -325,6 +361,7 @@ def test_a_rule_that_judges_nothing_says_why(words: dict[str, object], text: str
         ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1.1 703#05", None),
         ({"heartbeat": "3=100ms±20%"}, "1 703#00\n1.1 703#05\n1.2 703#05", None),
         ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1.1 703#05\n1.2 703#00\n1.3 703#00", None),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1.1 703#00", None),
         ({"max_gap": "181=20ms"}, "1 181#\n1.01 181#", None),
         ({"max_load": 50}, "1 181#", 5.0),
         ({"no_lost_heartbeat": True}, "1 703#05\n1.1 703#05", 1.2),

@@ -103,6 +103,17 @@ def test_a_gap_between_heartbeats_is_counted() -> None:
     assert render_board(board, 600_000, WIDE, 10)[1].endswith("late so far: 1")
 
 
+@pytest.mark.parametrize(("command", "late"), [("000#8105", 0), ("000#8106", 1)])
+def test_a_gap_before_a_boot_up_without_a_reset_is_counted(command: str, late: int) -> None:
+    decoder = Decoder()
+    board = NodeBoard(decoder)
+    frames = ["705#05"] * 3 + [command, *["705#00"] * 2]
+    for at_ms, text in zip((0, 100, 200, 250, 900, 1_900), frames, strict=True):
+        record = Record(at_ms * 1_000, "can0", CanFrame.parse(text))
+        board.take(record, decoder.take(record))
+    assert board.rows()[0].late == late
+
+
 def test_a_boot_up_that_nobody_asked_for_is_counted() -> None:
     row = status("705#00 705#7F 705#00")
     assert (row.boots, row.unrequested_boots, row.state_text) == (2, 1, "pre-operational")

@@ -70,9 +70,46 @@ def test_identifiers_have_their_periods_apart() -> None:
     assert broken("heartbeat every 10ms ±1ms", text) == []
 
 
-def test_the_gap_around_a_boot_up_is_free() -> None:
-    text = "1 703#05\n1.01 703#05\n1.5 703#00\n1.9 703#7F\n1.91 703#7F"
-    assert broken("heartbeat of 3 every 10ms ±10%", text) == []
+OF_3 = "heartbeat of 3 every 10ms ±10%"
+RESTART = "1.5 703#00\n1.9 703#7F\n1.91 703#7F"
+
+
+@pytest.mark.parametrize("reset", ["0.9 000#8103", "1.015 000#8200", "1.4 000#8103"])
+def test_the_gap_around_a_boot_up_after_a_reset_is_free(reset: str) -> None:
+    frames = sorted(["1 703#05", "1.01 703#05", reset], key=lambda line: float(line.split()[0]))
+    text = "\n".join(frames)
+    assert broken(OF_3, f"{text}\n{RESTART}") == []
+    lost = f"{text}\n{RESTART}\n2.5 703#00"
+    assert [line[:3] for line in broken(OF_3, lost)] == ["2.5"]  # a reset excuses one boot-up
+
+
+@pytest.mark.parametrize("other", ["000#8104", "000#0103", "000#8103R", "704#00", "000#81"])
+def test_the_gap_before_a_boot_up_without_a_reset_counts(other: str) -> None:
+    text = f"1 703#05\n1.01 703#05\n1.02 {other.removesuffix('R')}\n{RESTART}"
+    text = text.replace("000#8103", "000#R")
+    said = "without another before the boot-up, 9.000 to 11.000 is right"
+    assert broken(OF_3, text) == [f"1.5 node 3: 490.000 ms {said}"]
+    assert broken("heartbeat of 3 every 5ms..", text) == []
+    assert broken("heartbeat of 4 every 10ms ±10%", f"0.9 704#05\n{text}\n1.92 705#00")[1:] == []
+
+
+def test_the_gap_before_a_boot_up_is_that_of_each_identifier() -> None:
+    text = MAPPED + "1 183#\n1.01 183#\n1.02 703#05\n1.2 703#00\n1.5 183#\n1.51 183#"
+    said = "without another before the boot-up, 0.000 to 100.000 is right"
+    assert broken("(tpdo1 or heartbeat) and node=3 every ..100ms", text) == [
+        f"1.2 node 3: 190.000 ms {said}; node 3: 180.000 ms {said}",
+    ]
+    assert broken("tpdo1 of 3 every ..200ms", text) == []
+
+
+@pytest.mark.parametrize("rule", ["183", "183-184", "183 or 184", "183, 182", "id=183"])
+@pytest.mark.parametrize("before", ["000#8103", "704#05"])
+def test_a_rule_about_can_ids_knows_no_boot_up(rule: str, before: str) -> None:
+    text = f"1 183#\n1.01 183#\n1.02 {before}\n1.03 703#00\n1.2 183#"
+    assert broken(f"{rule} every ..20ms", text) == [
+        "1.2 node 3: 190.000 ms after the one before, 0.000 to 20.000 is right"
+    ]
+    assert broken(f"({rule}) and dlc=0 every ..20ms", text) == []
 
 
 SYNC = "sync to tpdo1 of 3 under 2ms"
