@@ -595,7 +595,7 @@ class _BusJudge:
                 self._until_boot(ident, piece, rhythm)
 
     def _until_boot(self, ident: int, piece: Sequence[int], rhythm: cycles.Rhythm) -> None:
-        """Find a TPDO that stops because its node restarts without an NMT reset.
+        """Find a TPDO that stops because its node boots again without an NMT reset.
 
         Another event before the boot-up, such as an NMT command, may end the TPDO on purpose.
         """
@@ -606,8 +606,8 @@ class _BusJudge:
         last, times = int(piece[-1]), self._times
         at = bisect_right(rows, last)
         end = int(rows[at]) if at < len(rows) else len(self._bus)
-        begin = bisect_right(one.restarts, last, key=_row_of)
-        behind = islice(one.restarts, begin, bisect_left(one.restarts, end, key=_row_of))
+        begin = bisect_right(one.beat_events, last, key=_row_of)
+        behind = islice(one.beat_events, begin, bisect_left(one.beat_events, end, key=_row_of))
         boot = next((found for found in behind if found.kind == "boot"), None)
         if boot is None:
             return
@@ -659,7 +659,7 @@ class _BusJudge:
                     self._lost(ident, end - begin, says, piece[at : at + 2], n)
             if piece is pieces[-1] and self._end_us - times[-1] > _LOST_AFTER * period:
                 self._lost(ident, self._end_us - times[-1], says, piece[-1:], 1)
-            elif (until := _next_restart(one, rows, piece[-1])) is not None:
+            elif len(times) > 2 and (until := _next_beat_event(one, rows, piece[-1])) is not None:
                 gap_us = until.at_us - times[-1]
                 if gap_us > _LOST_AFTER * period and not self._is_silent(
                     ident, times[-1], until.at_us, period
@@ -901,14 +901,14 @@ class _BusJudge:
 _row_of: Final = attrgetter("row")
 
 
-def _next_restart(
+def _next_beat_event(
     one: node_events.NodeEvents, heartbeats: Sequence[int], last: int
-) -> node_events.Restart | None:
+) -> node_events.BeatEvent | None:
     """Return the event before the next heartbeat up to which a node should have sent heartbeats."""
     at = bisect_right(heartbeats, last)
     end = heartbeats[at] if at < len(heartbeats) else None
-    place = bisect_right(one.restarts, last, key=_row_of)
-    found = one.restarts[place] if place < len(one.restarts) else None
+    place = bisect_right(one.beat_events, last, key=_row_of)
+    found = one.beat_events[place] if place < len(one.beat_events) else None
     if found is None or found.kind == "excuse" or (end is not None and found.row > end):
         return None
     return found

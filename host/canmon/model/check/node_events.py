@@ -81,15 +81,15 @@ class Cut(NamedTuple):
     node: int
 
 
-class Restart(NamedTuple):
+class BeatEvent(NamedTuple):
     """An event after which the heartbeats of a node begin again.
 
     Attributes:
         at_us: time of the event in microseconds.
         row: row of the event.
-        kind: what it is. Up to a boot-up without an NMT reset (`boot`), and up to an NMT reset or a
-            write to 1017h (`order`), the node should have sent its heartbeats. A boot-up after a
-            reset excuses their absence (`excuse`).
+        kind: kind of the event: `boot` for a boot-up without an NMT reset, `excuse` for a boot-up
+            after a reset, `order` for an NMT reset or a write to 1017h. The node should send its
+            heartbeats up to a `boot` or an `order`.
     """
 
     at_us: int
@@ -109,7 +109,7 @@ class NodeEvents:
         answers: rows of error control frames that a remote frame requested (node guarding).
         requested: rows of the remote frames that request the state of the node.
         boots: rows of boot-ups.
-        restarts: boot-ups, NMT resets, and writes to 1017h, in the order of their rows.
+        beat_events: boot-ups, NMT resets, and writes to 1017h, in the order of their rows.
         toggled: whether any error control frame had the toggle bit set.
         state: NMT state that the node reported last, or None before its first report.
         identity: values that were read from 1018h, by sub-index, each with the row of its first
@@ -120,7 +120,7 @@ class NodeEvents:
     answers: list[int] = field(default_factory=list)
     requested: list[int] = field(default_factory=list)
     boots: list[int] = field(default_factory=list)
-    restarts: list[Restart] = field(default_factory=list)
+    beat_events: list[BeatEvent] = field(default_factory=list)
     toggled: bool = False
     state: int | None = None
     command: tuple[int, int, int] | None = None  # when, the state that it wants, its row
@@ -297,7 +297,7 @@ class BusEvents:
             one = self.nodes[node]
             if command in _RESETS:
                 one.reset, one.command = True, None
-                one.restarts.append(Restart(at_us, self._row, "order"))
+                one.beat_events.append(BeatEvent(at_us, self._row, "order"))
             else:
                 one.command, one.told_since = (at_us, nmt.COMMANDED[command], self._row), 0
 
@@ -323,21 +323,21 @@ class BusEvents:
         heard = self._first.get(node, self._row) < self._row
         expected = one.reset or node in self._reset
         self._reset.discard(node)
-        one.restarts.append(Restart(at_us, self._row, "excuse" if expected else "boot"))
+        one.beat_events.append(BeatEvent(at_us, self._row, "excuse" if expected else "boot"))
         since_us = at_us - int(self._times[one.boots[-1]]) if one.boots else None
         if heard and not expected:
             if not self._untimed and since_us is not None and since_us <= PAIR_US:
                 said = f"two boot-ups within {ms_text(since_us)} ms: two nodes have this node-ID"
                 self._control_hit("doubled-node", node, said)
             else:
-                silent_us = 0 if self._untimed else at_us - self._heard_us(node)
+                silent_us = 0 if self._untimed else at_us - self._last_frame_us(node)
                 silent = f"{SILENT}{ms_text(silent_us)} ms before" if silent_us > 0 else ""
                 self._control_hit("no-reboot", node, f"boots again without an NMT reset{silent}")
         one.boots.append(self._row)
         one.reset, one.state, one.command = False, int(nmt.NmtState.INITIALISING), None
         self.cuts.append(Cut(at_us, node))
 
-    def _heard_us(self, node: int) -> int:
+    def _last_frame_us(self, node: int) -> int:
         """Return the time of the last frame of a node before the current one."""
         sent = [found for base in _SENT if (found := self._rows.get(base + node)) is not None]
         before = [bisect_left(found, self._row) for found in sent]
@@ -449,7 +449,7 @@ class BusEvents:
             if entry[0] in _PDO_PARAMETERS or entry[0] == _HEARTBEAT_TIME:
                 self.cuts.append(Cut(at_us, node))
                 if entry[0] == _HEARTBEAT_TIME:
-                    self.nodes[node].restarts.append(Restart(at_us, self._row, "order"))
+                    self.nodes[node].beat_events.append(BeatEvent(at_us, self._row, "order"))
             elif entry[0] in _SYNC_PARAMETERS:
                 self.cuts.append(Cut(at_us, 0))
 
