@@ -23,7 +23,8 @@
 # 3. Services (node_events.py): NMT, error control, EMCY and SDO frames, one by one, decoded as
 #    everywhere; of a client that polls a node the first and the last exchange of a row where numpy
 #    finds them (`exchanges`). They also give the *cuts*: times at which the rhythm changes on
-#    purpose, such as an NMT command or a write to 1800h. No rhythm is judged across a cut.
+#    purpose, such as an NMT command or a write to 1800h. No rhythm is judged across a cut, but a
+#    boot-up without an NMT reset ends a silence: the frames are missing from the last one on.
 # 4. Rhythms (cycles.py): all frames of an identifier at once, heartbeats, SYNC and PDOs; with
 #    numpy where a log is large. If a whole bus is silent, that is one finding, and not one for each
 #    identifier.

@@ -24,6 +24,7 @@ from tests.host.canmon.model.check.sound_log import (
 )
 from tickrig.host.canmon.model.check import bus_frames, cycles, learnt
 from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, Diagnosis
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 
@@ -196,6 +197,14 @@ def test_a_bus_that_is_switched_off_and_on_is_silent_once() -> None:
 
 def test_a_node_that_is_switched_on_later_was_not_lost() -> None:
     assert found_in([one for one in outage(5) if not is_of(one, 5) or one.at_us >= BACK_US]) == {}
+
+
+def test_a_period_that_only_an_eds_gives_finds_no_silence_before_1017h_is_written() -> None:
+    one = Diagnoser(eds={5: EdsObjects(values={(0x1017, 0): b"\x64\0"})})
+    node = "705#05 605#2B171000C4090000 585#6017100000000000 705#05"
+    records = lines("706#05 " * 8, 1_000_000) + lines(node, 2_500_000)
+    one.take(sorted(records, key=lambda record: record.at_us))
+    assert one.diagnosis().faults == ()
 
 
 def is_of(record: Record, node: int) -> bool:
