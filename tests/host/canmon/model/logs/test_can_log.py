@@ -127,7 +127,8 @@ def test_each_format_keeps_each_microsecond(times: list[int]) -> None:
     with TemporaryDirectory() as folder:
         for suffix in ("asc", "trc", "csv", "log", "jsonl"):
             assert through(Path(folder), f"run.{suffix}", times) == times
-        times.sort()
+        first_us = min(times)  # python-can writes nanoseconds of a log as a float: 104 days
+        times = sorted(at_us for at_us in times if at_us - first_us < (1 << 53) // 1_000)
         assert through(Path(folder), "run.blf", times) == times
 
 
