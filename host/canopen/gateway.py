@@ -25,7 +25,7 @@ from binascii import Error
 from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import IntEnum
 from math import isnan
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 from tickrig.host.canopen.commissioning.lss_master import SCAN_US, LssFailed, LssMaster
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -364,7 +364,6 @@ _CARRIED_OUT: Final[dict[str, tuple[Callable[..., str | None], int, int]]] = {
 
 A function without an answer of its own is answered by OK.
 """
-LSS_VERBS: Final = tuple(_CARRIED_OUT)
 
 
 def _within(value: int, least: int, most: int) -> int:
@@ -419,12 +418,15 @@ class Gateway:
         version: version that the gateway returns for the command `info version`.
     """
 
+    LSS_VERBS: ClassVar[tuple[str, ...]] = tuple(_CARRIED_OUT)
+    """Words of CiA 309-3 that begin an LSS command."""
+
     def __init__(self, bus: NodeBus, net: int, version: str) -> None:
         self._bus, self._net, self._version = bus, net, version
         self._node: int | None = None
         self._timeout_us = 500_000
         self._verbs: Mapping[str, Callable[[_GatewayRequest], str]] = {
-            **dict.fromkeys(LSS_VERBS, self._lss),
+            **dict.fromkeys(self.LSS_VERBS, self._lss),
             **dict.fromkeys(("r", "read"), self._read),
             **dict.fromkeys(("w", "write"), self._write),
             **dict.fromkeys((*_NMT_VERBS, "reset"), self._command),

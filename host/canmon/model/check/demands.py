@@ -56,6 +56,17 @@ class AtFrames:
         self._states = [_SignalState(test, paths, kept=each) for test, paths in states]
         self._kept = [state for state in self._states if state.kept]
 
+    @staticmethod
+    def is_event_signal(path: str) -> bool:
+        """Return whether a signal is one of `_EVENT_SIGNALS`, or a bit of it.
+
+        >>> is_known = AtFrames.is_event_signal
+        >>> is_known("5.code"), is_known("register.2"), is_known("speed")
+        (True, True, False)
+        """
+        name, _, bit = signal_place(path)[1].partition(".")
+        return name in _EVENT_SIGNALS and (not bit or bit.isdecimal())
+
     def select(self, *tests: Test) -> None:
         """Restrict the selected frames to those that pass more tests."""
         self._frames += tests
@@ -92,7 +103,7 @@ class _SignalState:
     def __init__(self, test: Test, paths: Collection[str], *, kept: bool) -> None:
         places = [signal_place(path) for path in paths]
         self._test, self._finders = test, [signal_reader(path) for path in paths]
-        self.kept = kept and not any(map(is_event_signal, paths))
+        self.kept = kept and not any(map(AtFrames.is_event_signal, paths))
         self._own = any(node is None and " " not in name for node, name, _ in places)
         self._latest: dict[tuple[str, int | None], tuple[bool, _Sender]] = {}
 
@@ -113,16 +124,6 @@ class _SignalState:
         if latest is None or latest[1] == _sender_of(record):  # a frame that is cut short
             return None
         return latest[0]
-
-
-def is_event_signal(path: str) -> bool:
-    """Return whether a signal is one of `_EVENT_SIGNALS`, or a bit of it.
-
-    >>> is_event_signal("5.code"), is_event_signal("register.2"), is_event_signal("speed")
-    (True, True, False)
-    """
-    name, _, bit = signal_place(path)[1].partition(".")
-    return name in _EVENT_SIGNALS and (not bit or bit.isdecimal())
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,7 +274,7 @@ class Truth(RuleDemand):
         self._alone = None if wanted else event.alone
         # without the event, too, it is judged: misspelt signals are reported by the rule
         forbids_frames = not wanted and (self._each or event.alone is not None)
-        self._proves = forbids_frames or all(map(is_event_signal, event.paths))
+        self._proves = forbids_frames or all(map(AtFrames.is_event_signal, event.paths))
         self.doubt = f"nothing with {event.text} came while it was in force"
 
     def pause(self) -> None:
@@ -787,7 +788,7 @@ class In(RuleDemand):
         self._values, self._holds = values, holds
         self.doubt = f"no value of {event.text} came while it was in force"
         self._wrong: set[_Sender] = set()
-        self._proves = self._once and all(map(is_event_signal, event.paths))
+        self._proves = self._once and all(map(AtFrames.is_event_signal, event.paths))
 
     def pause(self) -> None:
         """Allow the violation to be reported again."""

@@ -496,7 +496,7 @@ def errors_alone(
         signals: names of the signals in the filter.
     """
     words = {token.text for token in tokens}
-    if any(map(demands.is_event_signal, signals)) or _EMCY not in words or words & _OTHERS:
+    if any(map(demands.AtFrames.is_event_signal, signals)) or _EMCY not in words or words & _OTHERS:
         return test
     return lambda record, decoded: test(record, decoded) and not _is_reset(decoded)
 
@@ -769,7 +769,7 @@ def _made(name: str, text: str) -> ExpressionRule:
     parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
-    unsure = [path for path in paths if not demands.is_event_signal(path)]
+    unsure = [path for path in paths if not demands.AtFrames.is_event_signal(path)]
     missing = filters.MissingSignals(unsure, parser.words)
     return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 

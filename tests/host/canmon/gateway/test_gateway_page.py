@@ -7,7 +7,7 @@ from pathlib import Path
 from tests.emulators.testing.conformance.test_page import ThisEnvironment
 from tests.environment import ROOT
 from tests.page_runner import PageRunner
-from tickrig.host.canopen.gateway import LSS_VERBS
+from tickrig.host.canopen.gateway import Gateway
 
 PAGE = ROOT / "docs" / "reference/canmon/canmon-gateway.md"
 
@@ -20,4 +20,4 @@ def test_what_the_page_shows_happens(tmp_path: Path) -> None:
 
 def test_the_page_has_all_commands_of_lss() -> None:
     page = PAGE.read_text("utf-8")
-    assert [verb for verb in LSS_VERBS if verb not in page] == []
+    assert [verb for verb in Gateway.LSS_VERBS if verb not in page] == []
