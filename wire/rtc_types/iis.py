@@ -24,10 +24,7 @@ class TimedPose2D(Struct):
 
 
 class TimedPath2DSeq(Struct):
-    """A path: way points with the velocity at each of them.
-
-    The first way point is the start. A path without way points means stop.
-    """
+    """A path of way points, each with a velocity. The first is the start; an empty path stops."""
 
     idl_module = "IIS"
 

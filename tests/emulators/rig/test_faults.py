@@ -285,7 +285,9 @@ def table_of(faults: Mapping[str, FaultForm]) -> str:
 
 def test_the_page_names_the_bus_faults_that_a_device_can_have() -> None:
     page = (Path(__file__).parents[3] / "docs/reference/bench/faults.md").read_text("utf-8")
-    (line,) = re.findall(r"^(`drop`.*) of a device affect the frames", page, re.MULTILINE)
+    (line,) = re.findall(
+        r"^If you set the fault (`drop`.*) for a device, it affects", page, re.MULTILINE
+    )
     assert re.findall(r"`(\w+)`", line) == list(NARROWED)
 
 
