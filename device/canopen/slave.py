@@ -714,7 +714,7 @@ class Application(Service):
         """
 
     def without_power(self, now_us: int) -> int:
-        """Advance the physical state of the device without supply, such as a coasting motor.
+        """Simulate the device while it has no supply, for example the motor as it coasts.
 
         The method is called in the first tick without power, and when a physical input was set.
 

@@ -265,7 +265,7 @@ class Quantity:
     """A physical input of the device as a signal, such as a voltage, a load or a blocked shaft.
 
     Args:
-        bank: the inputs of the node's application.
+        bank: all physical inputs of the device; the signal is one of them.
         item: description of the input.
         on_change: function that is called after each change.
     """

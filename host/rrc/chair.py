@@ -329,7 +329,7 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def watch(self) -> list[Arrival[Event]]:
-        """Check the lines received since the last call, and end the drive if they report a problem.
+        """Check the lines received since the last call, and stop driving if they report a problem.
 
         Returns:
             The events that are no reason to stop, oldest first.

@@ -199,9 +199,9 @@ DEFAULT: Final = "default"
 class Configuration:
     """The configuration sets of a component, each with values for its parameters.
 
-    One set is active, and the component uses its values. A change is checked at once. The component
-    gets the changed values before the callbacks of its next period, at `initialize`, or when
-    `update` is called.
+    One set is active, and the component uses its values. A change is checked at once, but it takes
+    effect later: at `initialize`, when `update` is called, or at the beginning of the next period
+    of the component.
 
     Attributes:
         active_id: ID of the set whose values the component uses, or will use after the next update.

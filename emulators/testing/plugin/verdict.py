@@ -94,11 +94,12 @@ def _raiser(error: BaseException) -> str:
 
 
 def end_at_caller(error: BaseException) -> None:
-    """Shorten a traceback, so that it ends at the line of the user that called tickrig.
+    """Remove the frames of tickrig from a traceback, so that users see their own line last.
 
-    The traceback is shortened in this way if tickrig has refused a call, or if a host waits
-    endlessly. The exception may also come from a function of the user that tickrig has called, such
-    as a condition. Then only tickrig's frames between the test and this function are removed.
+    If tickrig refused a call, or if a host waits endlessly, the traceback ends at the line in the
+    test or in the host that called tickrig. If tickrig called a function of the test, such as a
+    condition, and this function raised, the traceback ends in this function, and the frames of
+    tickrig before it are removed.
 
     Args:
         error: the exception of the test.

@@ -137,8 +137,8 @@ def read_entry(
 ) -> object_table.EntryDescription:
     """Read the description of one entry from its section of an EDS.
 
-    If a keyword is missing, a warning or error is added to `file`. It has the value that is used
-    instead.
+    If a keyword is missing, a default value is used, and a warning or error that names this value
+    is added to `file`.
 
     Args:
         file: the EDS, which collects errors and warnings.

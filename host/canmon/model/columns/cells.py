@@ -98,7 +98,7 @@ def joined(count: int, parts: Sequence[Part]) -> str:
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
-    """Return an array of characters with one of two texts in each row.
+    """Return the cells of a column in which each row has one of two texts.
 
     Args:
         rows: mask that selects the text of each row.

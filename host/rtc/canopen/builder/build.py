@@ -140,7 +140,7 @@ def run_builder(
         out: folder for the files, or None to write no files.
         warn: function that is called with a line about each existing file that is not overwritten.
         force: whether to overwrite an existing skeleton.
-        every: whether the lines show every object, or only the objects of ports.
+        every: whether the lines list all objects. If not, they list only the objects of ports.
 
     Yields:
         Lines that describe the profile to the user.

@@ -351,9 +351,9 @@ _OUTPORT_IOR: Final = "dataport.corba_cdr.outport_ior"
 class DataEnd(ConnectorEnd):
     """The local half of a connector between a local data port and a data port in another process.
 
-    If the other process makes the calls, this class serves an object to it: an InPort into which
-    the other process pushes values, or an OutPort from which it pulls them. Otherwise, this class
-    calls the object of the other process.
+    One side of a connector offers a CORBA object, and the other side calls this object to push or
+    pull values. This class does the part of the local side: it offers the object, or it calls the
+    object of the other process.
 
     Args:
         place: ORB, threads, queues and names that the connector needs.
