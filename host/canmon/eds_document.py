@@ -45,7 +45,8 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documen
         encoding: Python name of the file's encoding, or empty to detect the encoding.
 
     Raises:
-        Refused: the file is unreadable, too large, binary, or a bus.yml.
+        Refused: the file is unreadable, too large, binary, or of another type that the user may
+            confuse with an EDS, such as a bus.yml.
     """
     with refusing(what, path=path), refusing(what, eds_file.EdsError):
         data = eds.read_eds_bytes(path)

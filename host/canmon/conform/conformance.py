@@ -111,8 +111,8 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
     """Return the text of the output file that an option of `canmon conform` requests.
 
     Args:
-        option: name of the option: `--html`, `--junit`, `--badge` or `--issue`. For any other name,
-            the result is the text of a baseline file with the failures of the run.
+        option: name of the option. `--html`, `--junit`, `--badge` and `--issue` each have their own
+            text. Any other option requests a baseline file, which lists the failures of the run.
         report: report of the run.
         baseline: failures that the user has declared as known.
         show: function that formats the recorded frames as lines.

@@ -257,7 +257,8 @@ def _ask_operator(*words: str) -> str:
 class CommandStimulus:
     """Stimulus that runs an external command each time a check operates or reads a signal.
 
-    The words of the check follow the arguments of the command. No shell is used.
+    A check passes words that say what to operate or read. They become the last arguments of the
+    command. No shell is used.
 
     Args:
         words: command and its arguments.
@@ -462,10 +463,13 @@ class Consent:
     def confirm(self, question: str) -> bool:
         """Ask the user a yes-or-no question. Return True for yes.
 
-        With the option `--yes`, the answer is yes without a question. Without a terminal, the
-        answer is no. If the node is emulated in virtual time, the answer is yes. If other nodes are
-        on the bus, LSS commands to all nodes are an exception, because these nodes would also
-        answer.
+        The user is not asked in these cases:
+
+        - With the option `--yes`, the answer is yes.
+        - If the node is emulated in virtual time, the answer is also yes. But if other nodes are on
+          its bus, the answer is no for LSS commands to all nodes, because the other nodes would
+          also answer.
+        - In all other cases without a terminal, the answer is no.
         """
         if self._yes:
             return True

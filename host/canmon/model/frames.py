@@ -201,7 +201,7 @@ def node_of(ident: int) -> int | None:
 def sender_of(ident: int) -> int | None:
     """Return the node-ID of the node that sends a CAN-ID by default in CANopen.
 
-    The result is None for a CAN-ID that no node-ID is assigned to send, such as 201h, which node 1
+    The result is None for CAN-IDs that no node sends by default. An example is 201h, which node 1
     receives.
 
     >>> sender_of(0x181), sender_of(0x581), sender_of(0x201), sender_of(0x701 | REMOTE)
@@ -350,8 +350,8 @@ def stamp_text(
         at_us: time to write, in microseconds.
         origin_us: time of the first frame.
         before_us: time of the previous item.
-        digits: least number of digits before the decimal point, first for a time, then for a span
-            between two times.
+        digits: two minimum numbers of digits before the decimal point. The first number applies to
+            an absolute time, the second one to a time since another frame.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']

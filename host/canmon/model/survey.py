@@ -438,7 +438,8 @@ def excerpts(
         frames: number of frames to include before and after each chosen frame.
 
     Returns:
-        The position of the first frame of each excerpt in the log, and its frames, by number.
+        A dictionary with the position of each chosen frame as its key. Each value has the position
+        in the log of the first frame of the excerpt, and the frames of the excerpt.
     """
     order = deque(sorted(set(numbers)))
     found: dict[int, _Frames] = {}

@@ -198,8 +198,9 @@ class BitRow(NamedTuple):
 
     Attributes:
         latest: bits in which the latest payload differs from the previous one.
-        planes: numbers of changes of all payload bits, split into binary digits. Integer n holds
-            digit n of the number of each bit. `counts` returns the numbers.
+        planes: counters of the changes of each payload bit, stored by binary digit. The integer
+            `planes[n]` is a set of bits: bit b is set if digit n of the counter of payload bit b is
+            1. `counts` returns the counters as normal numbers.
         notched: bits whose changes the user marked as known, so they are not shown.
     """
 
@@ -280,8 +281,8 @@ class IdRow(NamedTuple):
         frame: latest frame.
         gap_us: time between the two latest frames in microseconds, or None before the second frame.
         gaps: statistics of all gaps, or None before the second frame.
-        bits: total number of bits that all frames needed on the bus. `BitRates` defines the number
-            for CAN FD frames.
+        bits: total number of bits that all frames needed on the bus. For CAN FD frames,
+            `BitRates.bits` calculates the number.
         changed: statistics of the payload bits that changed.
     """
 
@@ -472,7 +473,9 @@ LEAST_WINDOW_US: Final = 500_000
 
 
 def bits_per_second(bits: int, span_us: int) -> int:
-    """Return the mean load over a time. Bits of frames that all have one time count for a second.
+    """Return the mean load over a time span in bits per second.
+
+    A span of 0, from frames that all have the same time, is replaced by one second.
 
     >>> bits_per_second(6_861, 490_000), bits_per_second(111, 0)
     (14002, 111)
@@ -532,7 +535,8 @@ class Load:
         """Count the bits of a frame.
 
         Returns:
-            The previous second if the frame is the first one after it, otherwise None.
+            The bits counted in the second that is now complete, if the frame is the first one after
+            that second, otherwise None.
         """
         self._bits += bits
         if at_us < self._begin_us + WINDOW_US:
@@ -544,7 +548,10 @@ class Load:
         return ended
 
     def end(self, end_us: int) -> BusSecond:
-        """Return the open second, by its own time if it lasts at least `LEAST_WINDOW_US`.
+        """Return the bits of the last second of the traffic, which may be incomplete.
+
+        If the traffic in this second lasts at least `LEAST_WINDOW_US`, the load is calculated for
+        its real duration, otherwise for a full second.
 
         Args:
             end_us: end of the traffic in microseconds.
@@ -563,7 +570,8 @@ class Load:
         Args:
             now_us: present time in microseconds.
             last_us: time of the latest frame or error frame in microseconds.
-            ended: whether no more frames follow, so that the open second is over.
+            ended: whether no more frames follow, so that the last second is judged although it is
+                incomplete.
         """
         span_us = max(last_us, self._begin_us) - self._first_us
         last = self.end(last_us) if ended else self._open(WINDOW_US)
@@ -731,7 +739,7 @@ class Traffic:
         """Return the present statistics of all buses and CAN-IDs.
 
         Args:
-            now_us: present time in microseconds. By default, the traffic has ended with the latest
+            now_us: present time in microseconds, or None if the traffic has ended with its latest
                 frame.
         """
         at_us = self._last_us if now_us is None else now_us

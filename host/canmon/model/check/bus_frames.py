@@ -41,7 +41,11 @@ class FramePlace(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """A violation of a rule on one bus. Later, those of one node or CAN-ID become one fault.
+    """A violation of a rule on one bus.
+
+    At the end of the diagnosis, all violations of one rule by one node are reported together as one
+    fault. If no single node is responsible, this applies to all violations of one rule with one
+    CAN-ID.
 
     Attributes:
         rule: name of the violated rule.
@@ -175,10 +179,10 @@ class BusFrames:
 
 
 def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], list[int]]:
-    """Return the times of a bus without jumps, and the rows at which the clock was set back.
+    """Return the corrected times of a bus, and the rows at which the clock was set back.
 
-    If only a few frames are out of order, each gets the time of a neighbouring frame. If the clock
-    of the recorder was set back, the times after that remain as they are in the log.
+    If only a few frames are out of order, each of them gets the time of a neighbouring frame. If
+    the clock of the recorder was set back, the times from this row on are not corrected.
 
     Args:
         bus: frames of the bus.

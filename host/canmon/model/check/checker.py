@@ -104,9 +104,10 @@ class RuleCheck:
         raise NotImplementedError
 
     def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
-        """Return the violation of the load limit in one second of a bus.
+        """Judge the load of a bus in one second.
 
-        The list has one finding if the load is too high. Otherwise it is empty.
+        The result is a list with one finding if the load is above the limit, otherwise an empty
+        list.
 
         Args:
             channel: name of the bus.
@@ -254,7 +255,8 @@ class Checker(RuleCheck):
             end_us: time in microseconds at which listening ended.
             lost: messages of the source about lost frames, and about lines of a log that are not
                 frames.
-            judged_us: time up to which rules that are expressions are judged, or None for `end_us`.
+            judged_us: end of the traffic in microseconds for rules that the user wrote as
+                expressions. None stands for `end_us`.
             errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)

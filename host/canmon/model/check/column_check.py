@@ -155,7 +155,9 @@ class _BusSelection:
         self._frames = np.empty(0, np.int64)
 
     def take(self, frames: Columns) -> tuple[Ints, Ints]:
-        """Return the rows of the frames that a rule must see, and the time gap before each of them.
+        """Return the rows of the frames to judge one by one, and the time gap before each of them.
+
+        Other frames cannot violate a rule or change its state, so they are only counted.
 
         Args:
             frames: block of frames of one bus.

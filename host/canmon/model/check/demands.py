@@ -39,14 +39,16 @@ _EVENT_KINDS: Final = frozenset(["emcy", "nmt", "lss", "time", "error"])
 class AtFrames:
     """Test of signals at certain frames, as `tpdo1 and 3.statusword.fault` has it.
 
-    If a frame does not contain a signal, its latest value on the bus counts. The values of
-    `_EVENT_SIGNALS` count only in their own frames. The test must see all frames.
+    If a selected frame does not contain one of the signals, the latest value of this signal on the
+    bus is used. For the signals in `_EVENT_SIGNALS`, earlier values are never used. To know the
+    latest values, the test must receive all frames of the bus.
 
     Args:
         frames: tests that select the frames.
         states: tests of signals, each with the names of its signals.
-        each: whether each frame is an event. If not, the tests only select senders, and the frame
-            must contain the signals.
+        each: whether the tests select a kind of frames, such as `tpdo1`, and not only a sender,
+            such as `node 3`. If False, earlier values are never used: a frame must contain the
+            signals.
     """
 
     def __init__(
@@ -239,7 +241,9 @@ class RuleDemand:
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Yield a description of each violation that is known only at the end, as a missing frame.
+        """Yield a description of each violation that is known only at the end of the traffic.
+
+        An example is a frame that never arrived.
 
         Args:
             end_us: end of the traffic in microseconds, or the current time if the traffic
@@ -258,9 +262,12 @@ MOST_COUNTED: Final = 10_000
 class Truth(RuleDemand):
     """Demand that a condition on signals is always true, or that it is never true.
 
-    A violation is reported when it begins. It is not reported again while it lasts. But each EMCY,
-    NMT, LSS, TIME and error frame is reported, and each selected frame that does not contain the
-    signals itself, as in `tpdo1 of 3 and node 3 stopped`.
+    A violation is reported when it begins. As long as it lasts, it is not reported again. Two kinds
+    of frames are always reported if they violate the demand:
+
+    - EMCY, NMT, LSS, TIME and error frames.
+    - Frames that the condition selects but that do not contain its signals. In `tpdo1 of 3 and node
+      3 stopped`, the TPDO does not contain the NMT state.
 
     Args:
         event: condition on signals, such as `position > 100`.
@@ -539,9 +546,12 @@ _RESETS: Final = (nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION)
 class Every(RuleDemand):
     """Demand that limits the time between two successive frames of the same CAN-ID.
 
-    If the event consists of CAN-IDs, all times between its frames are judged. Otherwise the time
-    from a boot-up of the node to its next frame is not judged. The time from the last frame to the
-    boot-up must not be too long, except if an NMT command has reset the node.
+    If the event names only CAN-IDs, the time between each two successive frames is judged. For
+    other events, a boot-up of the node interrupts the sequence:
+
+    - The time from the last frame to the boot-up is compared with `high_us` only. If an NMT command
+      has reset the node, this time is not judged.
+    - The time from the boot-up to the next frame is not judged.
 
     Args:
         event: event that selects the frames to judge.
@@ -772,13 +782,14 @@ _EMCY: Final = "emcy"
 class In(RuleDemand):
     """Demand that a value belongs to a set of valid values.
 
-    If the event is a signal, a violation is reported when it begins. For other events, and for the
-    signals of an EMCY, NMT, LSS, TIME or error frame, each frame with an invalid value is reported.
-    An EMCY with error code 0000h is always valid, because it reports that an error is gone.
+    If the event is the name of a signal, the first invalid value is reported, and then none until
+    the signal was valid again. For events that select frames, and for signals in EMCY, NMT, LSS,
+    TIME and error frames, each invalid value is reported. An EMCY with error code 0000h is always
+    valid, because it reports that an error is gone.
 
     Args:
-        event: name of a signal, or event that selects frames. Of a selected frame, the first value
-            is judged.
+        event: name of a signal, or event that selects frames. If it selects frames, the first
+            signal in each selected frame is judged.
         values: set of valid values as written in the rule, used in messages.
         holds: function that returns whether the value of a signal is valid.
     """

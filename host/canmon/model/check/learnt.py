@@ -454,7 +454,8 @@ def broken(
     Args:
         learnt: learnt rules for the bus.
         bus: summary of the traffic to judge.
-        frames: all frames of the bus. If something is missing, the violation names the last frame.
+        frames: all frames of the bus. The violation for a missing node or CAN-ID refers to the last
+            of these frames.
         times: corrected times of these frames in microseconds.
     """
     last_row = len(frames) - 1

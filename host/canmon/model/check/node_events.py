@@ -88,8 +88,9 @@ class BeatEvent(NamedTuple):
         at_us: time of the event in microseconds.
         row: row of the event.
         kind: kind of the event: `boot` for a boot-up without an NMT reset, `excuse` for a boot-up
-            after a reset, `order` for an NMT reset or a write to 1017h. The node should send its
-            heartbeats up to a `boot` or an `order`.
+            after a reset, `order` for an NMT reset or a write to 1017h. The node is expected to
+            send heartbeats until a `boot` or an `order`. Before an `excuse`, missing heartbeats are
+            not a fault.
     """
 
     at_us: int

@@ -42,10 +42,11 @@ def junit(
         suite: name of the test suite, which is the checked log or bus.
         names: names of all checked rules, including those without a finding.
         findings: findings in their order.
-        unjudged: reason why rules without a finding do not count as passed, or empty if they count
-            as passed.
-        skipped: reason why a rule could not be judged, by name of the rule. The test case of such a
-            rule is marked as skipped.
+        unjudged: reason why the whole check is incomplete, so that no rule counts as passed. Each
+            rule without a finding is then marked as an error. The text is empty if the check is
+            complete.
+        skipped: reason why a single rule could not be judged, by name of the rule. In a complete
+            check, the test case of such a rule is marked as skipped.
     """
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:

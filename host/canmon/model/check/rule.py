@@ -128,7 +128,10 @@ class Seen(NamedTuple):
 
 
 class CheckedTraffic(NamedTuple):
-    """Summary of the checked traffic, from which each rule decides whether it has judged anything.
+    """Summary of the checked traffic.
+
+    A rule without a finding has either passed, or the traffic contained nothing to judge. At the
+    end of a check, each rule uses this summary to find out which of the two is the case.
 
     Attributes:
         seen: number and times of the frames, by name of the bus and CAN-ID with flags. Error frames
@@ -149,7 +152,11 @@ class CheckedTraffic(NamedTuple):
 
     @property
     def is_short(self) -> bool:
-        """Whether the traffic is too short for its load to be judged by its own time."""
+        """Whether the traffic is shorter than `LEAST_WINDOW_US`.
+
+        The load of such short traffic is calculated for a full second, because the traffic may be a
+        single burst of frames.
+        """
         first_us = min((one.first_us for one in self.seen.values()), default=self.end_us)
         return self.end_us - first_us < LEAST_WINDOW_US
 
@@ -309,8 +316,9 @@ class HeartbeatTimes(NamedTuple):
 class Heartbeat(Rule):
     """Rule that the heartbeats of one node arrive neither too early nor too late.
 
-    The first heartbeat after a boot-up may arrive at any time. The time before a boot-up counts up
-    to the NMT reset of the node, or up to the boot-up if no NMT command has reset the node.
+    The first heartbeat after a boot-up may arrive at any time. If a boot-up follows a heartbeat,
+    only the upper limit applies. If an NMT command has reset the node, the time from the heartbeat
+    to this command is judged, otherwise the time to the boot-up.
 
     Args:
         times: node-ID, and limits of the time between two heartbeats.
@@ -381,7 +389,8 @@ class Heartbeat(Rule):
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Report that there was no gap to compare.
 
-        The gap after a boot-up does not count, and the gap before it only without a reset.
+        The gap from a boot-up to the next heartbeat does not count as a gap here. The gap from the
+        last heartbeat to a boot-up counts only if no NMT command has reset the node.
         """
         if evidence.untimed:
             return ONE_TIME
@@ -443,8 +452,8 @@ class _Watched:
     def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> str | None:
         """Store values of the node's objects that SDO traffic contains.
 
-        The result is a description as from `hear`, if the node was silent before its 1017h was
-        written.
+        A write to 1017h restarts the supervision of the heartbeat. If a heartbeat was lost before
+        the write, the result is a description of this violation, otherwise None.
         """
         step = (self._sdo.request if request else self._sdo.response)(at_us, data)
         said = None
@@ -457,7 +466,10 @@ class _Watched:
         return said
 
     def boot(self, at_us: int, reset_us: int | None) -> str | None:
-        """Process a boot-up of the node, and return a description as `hear` does.
+        """Process a boot-up of the node.
+
+        The result is a description of the violation if a heartbeat was lost before the boot-up or
+        the reset, otherwise None.
 
         Args:
             at_us: time of the boot-up in microseconds.
@@ -542,8 +554,9 @@ class NoLostHeartbeat(Rule):
 
     The expected period comes from 1017h in SDO traffic. If 1017h was not transferred, the measured
     period is used, or otherwise the value from an EDS file. A boot-up restarts the supervision. The
-    time before it counts up to the NMT reset of the node, or up to the boot-up if no NMT command
-    has reset the node.
+    supervision before a boot-up ends with the NMT reset of the node, or with the boot-up if no NMT
+    command has reset the node.
+
     Answers to node guarding requests, which have a toggle bit, do not count as heartbeats.
 
     Args:

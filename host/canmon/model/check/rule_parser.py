@@ -568,7 +568,7 @@ class _RuleParser(_QuantityParser):
     def rule(
         self,
     ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[_Slice]]:
-        """Parse the whole rule, and return its demand, scopes, signals and slices.
+        """Parse the whole rule, and return its demand, scopes, signals and slices of payloads.
 
         Raise RuleError if the text is not a rule.
         """

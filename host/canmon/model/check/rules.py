@@ -73,7 +73,7 @@ class Rules:
         return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
     def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
-        """Return a new `Rule` object for each rule that judges frames without their meaning.
+        """Return a new `Rule` object for each rule that does not need decoded frames.
 
         A rule object keeps the state of one check, so that each check needs new objects.
 

@@ -52,13 +52,13 @@ _MARK: Final = "\x01"
 
 
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return an array of numbers, each of which contains the characters of one text.
+    """Return an array of integers. The bytes of each integer are the characters of one text.
 
-    Such an array is a lookup table from which the texts of many rows are taken at once by index.
+    The array is a lookup table: numpy can take the texts of many rows from it at once by index.
 
     Args:
-        texts: ASCII texts, none longer than a number of the array.
-        dtype: numpy data type of the numbers, such as `<u4` for texts of up to four characters.
+        texts: ASCII texts. None of them may be longer than an integer of the array in bytes.
+        dtype: numpy data type of the integers, such as `<u4` for texts of up to four characters.
     """
     size = np.dtype(dtype).itemsize
     return np.array([text.encode() for text in texts], f"S{size}").view(dtype)
@@ -98,7 +98,7 @@ def joined(count: int, parts: Sequence[Part]) -> str:
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
-    """Return the cells of a column in which each row has one of two texts.
+    """Return an array of characters in which each row has one of two texts.
 
     Args:
         rows: mask that selects the text of each row.
@@ -151,8 +151,8 @@ class Texts:
     def cells(self) -> Cells:
         """The texts as an array of characters, with one row for each text.
 
-        Empty texts and the ends of short texts are filled with zeros. A text that is too wide for
-        the array is represented by a mark.
+        Empty texts and the ends of short texts are filled with zeros. In place of a text that is
+        too wide for the array, the row has the character `_MARK`.
         """
         pieces = list(self._pieces)
         for found in (self._single, dict.fromkeys(self._wide, _MARK)):
@@ -309,7 +309,8 @@ def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Ma
         scale: conversion of the integers to physical values.
 
     Returns:
-        The parts of the texts, and a mask that is True where the text is right.
+        The texts in parts, which are to be joined row by row: sign, digits before the decimal
+        point, point, and decimals. Also a mask that is True for each row with a right text.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

@@ -698,8 +698,8 @@ class ColumnNodes:
     """Updates a node board from blocks of frames, with numpy, for `canmon nodes`.
 
     After the last block, the board has the same state as if the frames had been processed one by
-    one. The only exception is `NodeStatus.pdos`, which contains only the PDOs that affect this
-    state, and which the command does not show.
+    one. The only exception is `NodeStatus.pdos`: it lacks PDOs that do not affect the other values
+    of the board. `canmon nodes` does not show `NodeStatus.pdos`.
 
     Args:
         decoder: decoder for single frames. Its attribute `standard` must be True.
@@ -742,13 +742,16 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Pairs of an expedited SDO request and its immediate answer, from which nothing is learnt.
+    """Pairs of an expedited SDO request and its answer, which add no knowledge about the node.
+
+    The block-wise survey may skip such pairs, for example when a master polls one object
+    repeatedly.
 
     Attributes:
         requests: rows of the requests.
         answers: rows of the answers, in the same order.
-        inner: whether the pair directly before and the pair directly after are of the same node. A
-            pair between two such pairs can be skipped without effect.
+        inner: mask that is True for each pair if the SDO exchanges directly before and after it are
+            of the same node. Such a pair can be skipped without effect.
     """
 
     requests: Ints
@@ -852,8 +855,9 @@ class Matter(NamedTuple):
     """Rows of a block whose frames must be decoded one by one, because they add knowledge.
 
     Attributes:
-        rows: rows of frames that can change what is known about nodes.
-        settling: rows of frames that can change the meaning of a CAN-ID.
+        rows: all these rows: their frames can change what is known about nodes or CAN-IDs.
+        settling: those of `rows` whose frames can change the meaning of a CAN-ID, such as SDO
+            frames and boot-ups.
     """
 
     rows: Ints
@@ -868,8 +872,8 @@ def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Ma
     Args:
         bus: decoder for single frames of this bus, which contains what is known so far.
         frames: block of frames of one bus.
-        but: rows that the caller does not need, because their frames do not change the state of
-            PDOs. None stands for no such rows.
+        but: rows to leave out, because the caller knows that their frames add no knowledge. None
+            leaves out no rows.
     """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

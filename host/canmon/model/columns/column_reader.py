@@ -471,10 +471,11 @@ class ColumnReader:
             yield rows.columns(self._channels)
 
     def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Yield the log in pieces, including marks and CAN FD frames, which columns cannot contain.
+        """Yield the log in pieces: blocks of columns, or lists of single items.
 
-        Most pieces are blocks of columns. A piece is a list of single frames and marks if it
-        contains a mark or a CAN FD frame, or if the format of the log cannot be read as columns.
+        Columns cannot contain CAN FD frames or marks. A mark is an event in the log, such as lost
+        frames. A piece with a CAN FD frame or a mark is a list. All pieces are lists if the format
+        of the log cannot be read as columns.
         """
         if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()

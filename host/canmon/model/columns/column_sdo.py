@@ -211,7 +211,8 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: index of each frame in the block for which texts are written.
+            places: for each frame of the bus, its index in the block of frames. The texts of the
+                block have the same index.
             side: SDO channel, node-ID and direction of each frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")

@@ -55,8 +55,8 @@ class ColumnSurvey:
     """Updates a survey from blocks of frames, with numpy, for `canmon report` and `canmon graph`.
 
     Args:
-        decoder: decoder for single frames that the survey uses. Its decoders in `first` may only be
-            DBC files.
+        decoder: decoder for single frames that the survey uses. `decoder.first`, the decoders that
+            are tried before all others, may contain only DBC files.
         survey: survey to update. No other code may update it.
     """
 

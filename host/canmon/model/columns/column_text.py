@@ -40,7 +40,10 @@ Intermediate results of these lines fit into the cache.
 
 
 def fits(columns: Columns) -> bool:
-    """Return whether all frames can be written at once. It needs printable ASCII bus names."""
+    """Return whether the text of all frames can be written at once.
+
+    This requires bus names that consist of printable ASCII characters.
+    """
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 

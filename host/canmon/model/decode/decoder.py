@@ -184,7 +184,8 @@ class BusDecoder:
         """Return the function that decodes a CAN-ID, if its frames can be decoded independently.
 
         The result is None for error control, SDO and multiplexed PDOs, because their meaning
-        depends on earlier frames. The function is valid until `changes` grows.
+        depends on earlier frames. The function is valid until the counter `BusDecoder.changes`
+        grows.
 
         Args:
             can_id: CAN-ID with 11 bits.
@@ -208,7 +209,7 @@ class BusDecoder:
         """Return the SDO channel that a CAN-ID belongs to, or None if it has no SDO frames.
 
         With the channel, the result contains True if the client sends the frames, or False if the
-        server sends them. The result is valid until `changes` grows.
+        server sends them. The result is valid until the counter `BusDecoder.changes` grows.
 
         Args:
             can_id: CAN-ID with 11 bits.
@@ -320,7 +321,8 @@ class BusDecoder:
 
         Args:
             node: node-ID of the SDO server.
-            step: effect of the frame on the transfer, as `SdoChannel` returns it.
+            step: result of `SdoChannel` for the frame: its text, and the transfers that ended with
+                it.
         """
         if not step.ended:
             return Decoded(

@@ -349,7 +349,8 @@ class MissingSignals:
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
-        words: words that no built-in decoder produces, each with its field, as in `Filter.words`.
+        words: pairs of a field and a word, as in `Filter.words`: the filter compares the field with
+            the word, as in `kind=word`. Built-in decoders never set a field to one of these words.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:

@@ -460,7 +460,8 @@ class NodeMemory:
     def describe(self, index: int, sub: int) -> ObjectText:
         """Return the description of an object, from an EDS file, or else from CiA 301 or CiA 402.
 
-        If the node is a drive, words such as the statusword have the names of CiA 402 in any case.
+        There is one exception: if the node is a drive, the descriptions of its controlword and its
+        statusword come from CiA 402, even if an EDS file describes them.
 
         Args:
             index: index of the object.
@@ -585,7 +586,9 @@ class TwoBeats(NamedTuple):
 
     Attributes:
         period_us: period of each of the two heartbeats in microseconds.
-        places: indices of the gaps from a frame of one heartbeat to a frame of the other.
+        places: indices of the gaps at which two heartbeats are visible: the gap between two
+            successive frames differs from the next gap, and the two gaps together last about one
+            period. Index n is the gap after frame n.
     """
 
     period_us: int

@@ -382,7 +382,10 @@ class Series:
             self.append(time_us, value)
 
     def append_state(self, at_us: int, value: float, name: str) -> None:
-        """Add a value, and the name of the state that it stands for, if it does."""
+        """Add a value, and the name of the state that the value stands for.
+
+        If the value does not stand for a state, the name is empty.
+        """
         if name:
             self.names = self.names or {}
             self.names[value] = name
@@ -649,8 +652,9 @@ class _Sampler:
     def take(self, record: Record, decoded: Decoded | None) -> int | None:
         """Add the value in a frame to the samples, if the frame contains the signal.
 
-        If the signal names no node, and the frame comes from another node than the earlier values,
-        return the node-ID of that node. Otherwise, return None.
+        A signal without a node-ID is bound to the first node that sends it. If another node sends
+        it later, return the node-ID of the other node, so that the caller can begin a series for
+        it. Otherwise, return None.
 
         Args:
             record: frame, with its bus and time.

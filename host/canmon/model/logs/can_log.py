@@ -183,7 +183,8 @@ class BlfBlock(NamedTuple):
     Attributes:
         rows: frames of the container, in the form that the parser of the container returns.
         frames: number of frames.
-        notes: offset, size and type of each object that reports an error.
+        notes: offset, size and type of each BLF object in the container that reports errors instead
+            of a frame, such as a driver error.
         end: offset after the last complete object.
     """
 
@@ -405,10 +406,10 @@ class _AscWriter:
     def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
         """Write many frames at once, which takes 0.4 us for each frame. A single frame takes 6 us.
 
-        The result is False if the format does not allow this for the block.
-
-        The caller must write these items one by one: error frames, a frame that begins another
-        block, and times that are not exact as floating-point numbers.
+        The result is False if this is not possible for the block, so that the caller must write its
+        frames one by one. The reasons are error frames, a frame from before the beginning of the
+        log, or of the block if the log is empty, and times that are not exact as floating-point
+        numbers.
         """
         first_us, earliest_us = block.first_us, block.earliest_us
         begin_us = self._begin_us
@@ -578,8 +579,8 @@ _MARKS: Final = "marks of gaps and triggers"
 class CanLogWriter:
     """Writer of a log in one of the formats that python-can writes, such as ASC or BLF.
 
-    These formats have numbers in place of bus names. The bus `can3` gets the number 3. A bus with
-    another name gets a free number, and `words` lists these numbers.
+    These formats have numbers in place of bus names. The bus `can3` gets the number 3. A bus whose
+    name is not `can` and a number gets a free number, and `messages` reports this number.
 
     Raises:
         LogError: python-can cannot write the format on this machine.

@@ -316,7 +316,11 @@ def log_format(path: Path) -> LogFormat:
 
 
 def check_written(path: Path, kind: LogFormat) -> None:
-    """Raise LogError for a file that is read alone, or that would be compressed twice."""
+    """Raise LogError if a log with this path and format cannot be written.
+
+    The format pcap can only be read. BLF and MF4 logs are already compressed, so their names must
+    not end in `.gz`.
+    """
     if kind is LogFormat.PCAP:
         raise LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
     if kind in (LogFormat.BLF, LogFormat.MF4) and path.suffix.lower() == COMPRESSED:

@@ -99,7 +99,8 @@ class ScreenClock:
             it counts from the first frame (`-t z`).
 
     Attributes:
-        shift_us: offset added to an adapter's counter of microseconds, so that no time is below 0.
+        shift_us: offset in microseconds, used if the time stamps come from the counter of a CAN
+            adapter. It is added to the counter, so that no time is below 0.
     """
 
     def __init__(self, deltas: bool = False) -> None:
@@ -363,8 +364,8 @@ class LogLines:
 
     Attributes:
         tally: counts of lines that are not frames.
-        marks: marks among the frames that the last call returned, each with the number of these
-            frames before the mark.
+        marks: marks, such as lost frames, that the last call found among its frames. Each mark is
+            paired with the number of frames of this call that precede the mark.
         number: number of lines read so far.
     """
 
@@ -394,7 +395,8 @@ class LogLines:
         Args:
             lines: number of lines.
             latest_us: time of the last frame in the lines, or None if they hold no frame.
-            unusual: whether `is_usual` is false for one of the lines.
+            unusual: whether one of the lines is not a data frame in the form that candump writes,
+                as `is_usual` determines.
         """
         self.number += lines
         if unusual:
@@ -633,9 +635,9 @@ _NUMBERLESS: Final = "canX"
 
 
 def bus_name(number: str) -> str:
-    """Return the name of a bus for its number in a log, which counts from 1, or `canX` for 0.
+    """Return the name of a bus for its number in a log, such as `can0` for the number 1.
 
-    A text that is not a number raises ValueError.
+    For the number 0, the name is the text `canX`. A text that is not a number raises ValueError.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

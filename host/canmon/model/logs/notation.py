@@ -25,8 +25,8 @@ _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 def parse_frame(notation: str) -> AnyFrame:
     """Parse a frame in candump notation, such as `123#DEADBEEF`.
 
-    The raw length code after eight bytes is ignored. An error frame may have fewer than eight
-    bytes.
+    A suffix such as `_9`, the raw DLC of a frame with eight data bytes, is ignored. An error frame
+    may have fewer than eight bytes.
 
     Raises:
         WireError: the text is not a valid frame.
@@ -55,8 +55,9 @@ def json_line(record: Record, more: str = "") -> str:
     as `id`. A CAN FD frame has `fd`: 1, and `brs`: 1 and `esi`: 1 if these bits are set. `more`
     contains further members, each with a comma before it.
 
-    Other lines are events: `{"v":1,"ev":"drop","n":12}` reports lost frames, and a line of a serial
-    port is also an event.
+    This function writes only frames. A JSONL log also has lines for events, with the member `ev`.
+    For example, `{"v":1,"ev":"drop","n":12}` reports lost frames. The text that a serial port
+    receives or sends is also written as events.
 
     >>> json_line(Record(1_500_000, "can0", can.CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'

@@ -482,8 +482,8 @@ _LOOK_FRAMES: Final = 512
 class Files:
     """Writer of a recording into one file, or into parts that an index file lists.
 
-    If an index exists already, its recording is continued. Its parts stay, and count for the
-    limits.
+    If an index exists already, its recording is continued. The existing parts are kept, and their
+    size counts towards the maximum total size.
 
     Args:
         plan: settings of the recording.

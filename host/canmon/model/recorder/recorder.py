@@ -154,7 +154,8 @@ class PreTrigger:
         span: amount of traffic to keep, as a number of frames or a time.
 
     Attributes:
-        short: whether the buffer holds less than the span, because the span had too many frames.
+        short: whether the buffer holds less than the wanted time, because the frames of this time
+            were more than the buffer can hold.
     """
 
     def __init__(self, span: TriggerSpan) -> None:
