@@ -504,10 +504,11 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 
 @contextmanager
 def below(*path: str | int) -> Iterator[None]:
-    """Context manager that puts the keys of an outer table in front of the path of a SettingError.
+    """Context manager for reading a nested table, so that errors name the full path of a setting.
 
-    A function that reads a nested table uses this context manager, so that the error names the full
-    path. Any other ValueError in the block becomes a SettingError with the path of the outer table.
+    If the block raises a SettingError, the path of the error is relative to the nested table. The
+    keys in `path`, which lead to the nested table, are put in front of it. Any other ValueError in
+    the block becomes a SettingError with the path `path`.
     """
     try:
         yield

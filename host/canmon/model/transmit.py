@@ -428,7 +428,7 @@ class TransmitList:
         self.rows[number].enable(now_us)
 
     def once(self, number: int) -> AnyFrames:
-        """Return the frame that sends a row once, now.
+        """Return the frame to send now, so that a row of the transmit list is sent a single time.
 
         Args:
             number: number of the row in the list, from 0.

@@ -317,9 +317,10 @@ def _range(text: node_memory.ObjectText) -> str:
 
 
 def limits(objects: NamedObjects, entry: Entry) -> str:
-    """Return the range of values that the EDS allows for an object, as the final part of a message.
+    """Return the range of values that the EDS allows for an object, as text.
 
-    The text is empty if the EDS gives no range.
+    The caller appends the text, such as `; the EDS allows 0 to 9`, to an error message. The text is
+    empty if the EDS gives no range.
     """
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):

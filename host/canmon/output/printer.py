@@ -62,9 +62,10 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return a cut of the same part of a log that also passes earlier frames to the decoder.
+        """Return a copy of a `LogCut` that also passes the frames before the part to the decoder.
 
-        The decoder learns from the frames before the part, but does not return these frames.
+        The decoder learns from the frames before the selected part of the log. The command does not
+        print these frames.
         """
         if self._decoder is None or cut.begin is None:
             return cut
@@ -256,9 +257,11 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 class StdoutWriter:
     """Writer that prints frames on standard output in the format of `canmon dump`.
 
-    If the format is JSON or a log, each event between frames is also a line. A log and CSV keep
-    their control characters, so that other programs can read the same text again. On a terminal,
-    control characters are replaced.
+    If the format is JSON or a log, each event between frames is also a line.
+
+    Control characters in the text are replaced, so that they cannot affect a terminal. The log and
+    CSV formats are an exception: if standard output is not a terminal, their control characters are
+    kept, so that other programs receive the exact text.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:

@@ -64,7 +64,8 @@ class SocketReader:
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
         tally: counts of items that are not frames.
-        stepped: whether virtual time passes only while the bus is read, which is always False.
+        stepped: whether virtual time passes only while the bus is read. It is False, because a
+            SocketCAN bus runs in real time.
     """
 
     stepped = False
@@ -274,7 +275,8 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     The word overrides the options.
 
     If the option `-i` names the interface, the whole word is the channel, even if it contains
-    colons. A word that begins with this interface is an exception.
+    colons. But if the word begins with the name of this interface and a colon, only the rest of the
+    word is the channel.
 
     Raises:
         Refused: the word and -c name different channels.

@@ -155,7 +155,8 @@ _KIND: Final = "rrc"
 class RrcLines:
     """Decoder of the traffic between a host and an RRC on a serial line.
 
-    Both directions are decoded. The bytes may arrive in chunks of any size.
+    An RRC (Robotic Relay Communicator) is a device that controls a wheelchair for a host. Both
+    directions are decoded. The bytes may arrive in chunks of any size.
 
     Args:
         channel: name of the line in the records.

@@ -278,7 +278,8 @@ class ReopeningReader(Generic[_Item]):
         If the bus went away or is back, the result contains marks that report this.
 
         Raises:
-            LinkClosed: the bus is gone, and `wanted` is not set.
+            LinkClosed: the bus is gone, and the attribute `wanted` is False, so that the bus is not
+                opened again.
         """
         try:
             reader = self._reader or self._opened(timeout_us)

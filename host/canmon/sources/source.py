@@ -607,9 +607,10 @@ class BlockLog(AnySource["Columns"]):
 
 
 class PieceLog(_LoggedSource):
-    """Source that reads a log file in pieces: as columns if possible, otherwise as frames.
+    """Source that reads a log file in pieces: as columns if possible, otherwise as lists of frames.
 
-    A piece of frames ends at the next marks.
+    A mark is an event in the log, such as lost frames. A list of frames ends where the log has the
+    next marks.
 
     Raises:
         SourceFailed: the file cannot be read.

@@ -272,9 +272,10 @@ class Session:
         return self._thread is not None
 
     def over(self, model: Model) -> Session:
-        """Return a new session that reads the same source into another model.
+        """Return a new session that continues to read the same source, but with a new model.
 
-        Close the present session before you call this method.
+        It is used when the user changes the EDS or DBC files while the source is running. Close the
+        present session before you use the new one.
         """
         session = Session(self.source, model, self.buses, self._clock)
         session.words = self.words

@@ -100,7 +100,10 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count checked frames. The first call may determine the time that is displayed as 0.
+        """Count checked frames.
+
+        If findings are displayed with their times since the first frame, the first call sets the
+        time of this frame.
 
         Args:
             frames: frames to count. There is at least one frame.

@@ -97,7 +97,9 @@ class _GraphRequest:
     title: str
 
     def view(self, series: Sequence[Series], first_us: int | None) -> View:
-        """Return the part of the curves to draw. Raise Refused if its options are invalid.
+        """Return the part of the curves to draw.
+
+        Raise Refused if the options of the command that select this part are invalid.
 
         Args:
             series: samples of each curve.

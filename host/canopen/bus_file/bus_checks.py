@@ -215,8 +215,9 @@ def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
     """Return a finding for each faulty EDS of the slaves.
 
-    The finding contains the number of errors that `canmon eds check` finds. It also names the
-    errors because of which dcfgen cannot read the EDS.
+    The finding contains the number of errors that `canmon eds check` finds. Some errors prevent
+    dcfgen, the Lely program that reads a bus.yml, from reading the EDS. The finding also contains
+    the names of these errors.
     """
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):

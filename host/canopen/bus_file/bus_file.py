@@ -203,7 +203,11 @@ class BusFile:
 
     @property
     def warnings(self) -> tuple[RuleFinding, ...]:
-        """Findings for which dcfgen only prints a warning, or a node refuses a write at boot-up."""
+        """The findings that do not prevent the use of the file.
+
+        For example, dcfgen prints a warning but continues, or a node will refuse a write at
+        boot-up.
+        """
         return self._of(Severity.WARNING)
 
     def _of(self, severity: Severity) -> tuple[RuleFinding, ...]:

@@ -19,12 +19,15 @@ _COGEN: Final = (OPTIONS, MASTER, _DEFAULTS, _NODES)
 class Layout(NamedTuple):
     """The sections of a bus.yml, found in the same way as dcfgen finds them.
 
+    A bus.yml is written for one of two programs. dcfgen reads nodes at the top level of the file.
+    cogen reads nodes in the section `nodes`, and writes a file for dcfgen.
+
     Attributes:
         options: section `options`, or None if the file has none.
         master: section `master`, or None if the file has none.
         slaves: sections of the slaves by name, in the order of dcfgen.
-        hidden: file and line of each top-level key that begins with a dot, by key. There are none
-            for a file in the layout of cogen, because dcfgen does not read such a file directly.
+        hidden: file and line of each top-level key that begins with a dot, by key. The dictionary
+            is empty for a file that is written for cogen, because dcfgen never sees these keys.
         defaults: section whose keys cogen copies to all nodes, or None if the file has none.
     """
 
@@ -38,9 +41,10 @@ class Layout(NamedTuple):
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of options, master and slaves in a bus.yml.
 
-    A top-level key that begins with a dot is not a node, because its value only defines YAML
-    anchors. In the layout of cogen, the keys in `defaults` override the keys of each node, and all
-    keys are sorted.
+    In a file for dcfgen, a top-level key that begins with a dot is not a node, because its value
+    only defines YAML anchors. A file for cogen has a section `nodes` or `defaults`. Such a file is
+    read as cogen converts it for dcfgen: the keys in `defaults` replace the same keys of each node,
+    and then all keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)

@@ -31,7 +31,10 @@ class BusFileNotes:
         self._found: dict[tuple[str, FilePlace, str], RuleFinding] = {}
 
     def note(self, rule: str, place: FilePlace, where: str, text: str) -> None:
-        """Add an error or a warning. An equal finding of other nodes in the same line is ignored.
+        """Add an error or a warning.
+
+        Several nodes may use the same line of the file, for example by a YAML anchor. If one of
+        them already has a finding with this rule, place and text, the new finding is ignored.
 
         Args:
             rule: name of the violated rule.
@@ -55,7 +58,8 @@ class BusFileNotes:
     def all(self) -> tuple[RuleFinding, ...]:
         """All errors and warnings in the order of their lines.
 
-        An error is left out if it only follows from an unknown key in the same line.
+        A misspelt key is reported as an unknown key. Other errors that the misspelt key may cause
+        in the same line, such as a missing value, are left out.
         """
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}

@@ -63,8 +63,9 @@ class PdoReader:
         node: section of the slave in the bus.yml.
         sheet: EDS or DCF of the slave.
         writes: collector of the SDO writes that configure the slave.
-        cob_ids: source of the COB-IDs that `auto` gives to PDOs beyond the fourth, shared by all
-            nodes of the bus.
+        cob_ids: source of free COB-IDs, shared by all nodes of the bus. They are used for PDOs with
+            `cob_id: auto` from the fifth PDO of a node on. The first four PDOs have default
+            COB-IDs.
     """
 
     def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:

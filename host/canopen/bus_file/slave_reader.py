@@ -41,7 +41,11 @@ class SlaveReader:
         self.writes = Writes(sheet, node.name, node.notes)
 
     def read(self) -> BusSlave:
-        """Return the slave with its PDOs. Collect its SDO writes in `writes`, in dcfgen's order."""
+        """Return the slave with its PDOs.
+
+        The SDO writes that configure the slave are added to the attribute `writes`, in the order in
+        which dcfgen writes them.
+        """
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()

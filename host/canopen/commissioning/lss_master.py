@@ -74,8 +74,8 @@ class LssMaster:
             microseconds.
 
     Attributes:
-        waiting: whether all slaves have been switched back to the LSS state waiting at the end of
-            the block of `at_work`.
+        waiting: whether `at_work` has ended and has switched all slaves back to the LSS state
+            `waiting`.
     """
 
     def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:

@@ -95,7 +95,9 @@ class NodeBus:
         return self.states.get(node_id)
 
     def run(self, node_id: int, script: Script[T], timeout_us: int = 0) -> T:
-        """Run a script of SDO requests with a node. Return its result, or raise its error.
+        """Run a script with a node. Return the result of the script, or raise its error.
+
+        A script is a generator that yields SDO requests and receives their responses.
 
         Args:
             node_id: node-ID of the node to which the script sends its requests.

@@ -182,7 +182,7 @@ def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], l
     """Return the corrected times of a bus, and the rows at which the clock was set back.
 
     If only a few frames are out of order, each of them gets the time of a neighbouring frame. If
-    the clock of the recorder was set back, the times from this row on are not corrected.
+    the clock of the recorder was set back, the times from that row on are not corrected.
 
     Args:
         bus: frames of the bus.

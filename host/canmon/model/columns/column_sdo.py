@@ -211,8 +211,8 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: for each frame of the bus, its index in the block of frames. The texts of the
-                block have the same index.
+            places: index in the block of frames, for each frame of the bus. The texts that are
+                written for the block have the same indices.
             side: SDO channel, node-ID and direction of each frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")

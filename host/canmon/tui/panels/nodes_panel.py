@@ -139,7 +139,10 @@ def _state(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
-    """Return the age of a node's heartbeat as text with a bar, which is full after one period."""
+    """Return the time since the last heartbeat of a node, as a bar and text.
+
+    The bar grows with this time, and is full when one heartbeat period has passed.
+    """
     age_us, period_us = row.age_us(now_us), row.heartbeats.period_us
     if age_us is None:
         return plain("never seen", BAD) if period_us else ()

@@ -174,7 +174,10 @@ class PromptLine(Vertical):
 
 
 class PictureView(LineView, inherit_bindings=False):
-    """A widget that shows a picture. It has no keys, so that the panel receives all keys."""
+    """A widget that shows a picture made of characters, such as the curves of the graph panel.
+
+    The widget does not handle any keys, so that the panel around it receives all of them.
+    """
 
     class Pointed(Message):
         """Message that the picture was clicked.

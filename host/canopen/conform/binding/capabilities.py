@@ -70,8 +70,9 @@ class EdsClaims(NamedTuple):
     Attributes:
         lss: whether the node supports LSS.
         dummies: names of the features for the dummy objects that the node allows in a PDO mapping.
-        identity: first numbers of the identity object 1018h by sub-index, from the section
-            DeviceInfo.
+        identity: vendor-ID, product code and revision number of the identity object 1018h, by
+            sub-index. They come from the section DeviceInfo of the EDS, and numbers that are
+            missing there are left out.
     """
 
     lss: bool
@@ -117,8 +118,9 @@ class NodeDescription(NamedTuple):
     ) -> NodeDescription:
         """Make the description of an emulated node from its object table, without writing an EDS.
 
-        The result is the same as that of an EDS with these objects. Therefore every number has its
-        power-on value as its default value, and an empty text has no default value.
+        The result is the same as if the objects had been written to an EDS, and the EDS had been
+        read. In such an EDS, the default value of each numeric object is its value at power-on. An
+        object whose value is an empty text has no default value.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]

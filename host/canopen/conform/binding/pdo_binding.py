@@ -149,8 +149,8 @@ def bind_pdos(
 ) -> tuple[dict[str, BoundPdo], dict[str, str]]:
     """Find one PDO of the node for each PDO name in conformance checks.
 
-    The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks send
-    no data to any other RPDO before they have changed its mapping.
+    The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks may
+    send data to this RPDO at once. For each other RPDO, checks must change the mapping first.
 
     Args:
         device: device that the EDS describes.

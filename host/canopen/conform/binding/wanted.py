@@ -98,10 +98,11 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the dictionary entries that can replace this name in checks, in the given order.
+        """Return the objects of a node that fit this name in checks, in the given order.
 
-        If checks write the object, the result contains no communication object whose values CiA 301
-        limits further.
+        A check contains the name in place of an index and sub-index. The run replaces the name by
+        one of these objects. If the checks write to the object, the result contains no
+        communication object whose values CiA 301 limits further.
         """
         # One loop without function calls, which took a tenth of the time of a single check.
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE

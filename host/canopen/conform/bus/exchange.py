@@ -309,14 +309,15 @@ class BusExchange:
         return self._link.now_us
 
     def begin(self, within_us: int, watched: frozenset[str] | None = None) -> None:
-        """Start to record the frames of a check, or of the work between two checks.
+        """Begin a check, or the work between two checks.
 
-        The record of earlier frames is dropped.
+        The recorded frames of the previous check are dropped.
 
         Args:
             within_us: longest duration of the check or of the work, in microseconds.
             watched: CAN-IDs whose frames are recorded, in addition to the CAN-IDs of the node under
-                test. None stands for work between two checks, which is not recorded.
+                test. An empty set adds no CAN-IDs. None stands for the work between two checks: no
+                frames are recorded.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
@@ -343,8 +344,9 @@ class BusExchange:
     def end_listening(self) -> None:
         """Detect other nodes only by their heartbeat from now on.
 
-        Before this call, frames with other CAN-IDs also show other nodes. From now on, the node
-        under test may send such frames.
+        Before this call, each frame with a CAN-ID of another node shows that this node exists.
+        Later, checks may cause the node under test to send such frames, so that only heartbeats are
+        certain.
         """
         self._others_by = _HEARTBEATS
 
@@ -489,7 +491,10 @@ class BusExchange:
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Do not count the time since the last poll as a delay, because the host asked the user."""
+        """Do not count the time since the last poll of the bus as a delay of this host.
+
+        The caller has waited for the user, for example for the answer to a question.
+        """
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:
@@ -505,7 +510,10 @@ class BusExchange:
             self._listen(until_us)
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for the next frames. Return a time, and all frames that have arrived by then."""
+        """Wait for the next frames.
+
+        The result is a time in microseconds, and all frames that have arrived up to this time.
+        """
         if until_us <= self._known_us == self._link.now_us:
             return self._known_us, ()  # in virtual time; a poll costs as much as a request
         received = self._listen(until_us)

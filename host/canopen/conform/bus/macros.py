@@ -302,9 +302,10 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     Args:
         sdo: SDO frames of the node, used for access to the bus.
         can_id: CAN-ID of the node's error control messages.
-        words: expected NMT states in hex, one per request. The word `=7F` expects the state 7Fh
-            with a toggle bit of 0. A word that contains # is a frame that is sent before the next
-            request.
+        words: expected NMT states in hex, one per request, such as `7F`. In the first answer, the
+            toggle bit may be 0 or 1, and must then alternate. With the prefix `=`, as in `=7F`, the
+            toggle bit must be 0. A word that contains # is not a state but a frame, which is sent
+            before the next request.
     """
     toggle: int | None = None
     for word in words:
