@@ -205,11 +205,15 @@ class Unanswered(list[Object]):
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
-        """Return an object to read, whose answer comes after all late answers about object `at`.
+        """Return an object to read in order to wait for late answers about object `at`.
 
-        If the object of the latest request is suitable, it is returned again, so that a node that
-        is gone gets repeated requests for the same object. If all suitable objects have unanswered
-        requests, the oldest request is dropped.
+        The server answers in order. The answer about the returned object therefore comes after all
+        late answers about `at`.
+
+        All objects of `FENCES` except `at` are suitable. If the object of the latest request is
+        suitable, this object is returned again, so that a node that is gone gets repeated requests
+        for the same object. If all suitable objects have unanswered requests, the oldest request is
+        dropped.
         """
         last = self[-1]
         if last in FENCES and last != at:

@@ -59,8 +59,8 @@ def open_eds(path: Path) -> EdsFile:
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
     """Read an EDS, DCF, XDD or XDC file. Return its sections and the device that they describe.
 
-    Files with equal bytes are parsed only once, so callers share the result. Do not change it, and
-    do not add findings to the file.
+    Files with equal bytes are parsed only once, so several callers may get the same two objects. Do
+    not change these objects, for example by adding findings to the `EdsFile`.
 
     Raises:
         OSError: the file cannot be read.

@@ -103,8 +103,8 @@ class Macro:
     """Step that runs a macro, an operation that needs many frames, such as an LSS fastscan.
 
     Attributes:
-        words: arguments of the macro. When a run has replaced the names, addresses of objects are
-            among the arguments.
+        words: arguments of the macro. In a check, an argument may be the name of an object. Before
+            a run executes the step, it replaces each name by the index and sub-index of the object.
     """
 
     name: str
@@ -224,7 +224,10 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """Level of a run: how much it may change the tested node. A level includes the earlier ones."""
+    """Level of a run: how much the run may change the tested node.
+
+    Each level also allows everything that the lower levels allow.
+    """
 
     READ_ONLY = 0
     """SDO uploads and listening.
@@ -338,7 +341,7 @@ class ConformancePlan:
     def may_choose(self, group: str, place: str = "") -> bool:
         """Return whether the patterns of `--only` can match a check, before the check is built.
 
-        The caller then skips the files of groups and the checks of objects that are not selected.
+        If the result is False, the caller skips the file of the group, or the checks of the object.
 
         Args:
             group: name of the group.

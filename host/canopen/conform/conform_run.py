@@ -109,10 +109,11 @@ class _StrayHeartbeat:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Check after the run that the node still sends a heartbeat that 1017h does not enable.
+        """Report after the run if a heartbeat that 1017h does not enable has stopped.
 
-        This applies to a node that sent such a heartbeat before the run. If the heartbeat is
-        missing now, it is reported as not restored, because the tester cannot switch it on again.
+        Some nodes send a heartbeat before the run although their object 1017h does not enable one.
+        If such a heartbeat is missing after the run, the heartbeat is reported as not restored,
+        because the tester cannot switch it on again.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:
@@ -157,7 +158,8 @@ class ConformRun:
         node_id: node-ID of the node, 1..127.
         plan: options of the run, such as level and selected checks.
         device: device that the EDS describes, or None to find out the objects from the node.
-        claims: capabilities of the device that only the EDS states, or None without an EDS.
+        claims: capabilities that the EDS states beside the list of objects, such as LSS support, or
+            None without an EDS.
         source: name of the bus as the user entered it, for the report.
         on_result: function that is called with the result of each check.
     """
@@ -202,6 +204,8 @@ class ConformRun:
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
         """Make the running check fail, because the program of the node crashed and starts again.
+
+        This method is for emulated nodes, whose exceptions the tester can see.
 
         Args:
             reason: exception of the crash in one line.

@@ -140,8 +140,10 @@ class KnownState:
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
         """Restore the objects that a reset has changed to the values with which each check begins.
 
-        The first reset of a kind shows which objects it changes. After later resets of this kind,
-        the tester reads only these objects and the objects written since the last reset.
+        There are several kinds of resets, such as NMT reset communication. After the first reset of
+        a kind, the tester reads all objects, and records the objects that this kind of reset
+        changes. After later resets of the same kind, the tester reads only the recorded objects and
+        the objects written since the last reset.
 
         Args:
             resets: kinds of the resets that happened, empty if the kind is unknown.
@@ -315,7 +317,8 @@ class NodeCare:
         level: level of the run. With the level READ_ONLY, nothing is written.
 
     Attributes:
-        state: values of the node: those before the run, and those with which each check begins.
+        state: store of two values of each object: the value before the run, and the value with
+            which each check begins.
         errors: the bits of the error register that were set before the run and are still set.
         lost: whether the node no longer answers.
     """
@@ -331,7 +334,10 @@ class NodeCare:
         self._stored = self.lost = False
 
     def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Record the values of the node before the run, and bring it into the state for checks.
+        """Record the values of the node before the run, and prepare the node for the checks.
+
+        The node is switched to Pre-operational. Objects that would disturb checks, such as the
+        timers of PDOs, get other values. With the level READ_ONLY, nothing is done.
 
         Args:
             addresses: index and sub-index of each object that may change in the run.

@@ -73,10 +73,11 @@ class _Names(Protocol):
     def text(self, name: str, attribute: str, /) -> str:
         """Return the text that replaces `$name.attribute` in a check.
 
-        All values are in hex, in the byte order of the bus. The attributes `new` and `other` of an
-        object are two allowed values. The attribute `old` is the value before the run, and `map` is
-        the mapping entry of the object. An empty attribute stands for the multiplexer of the object
-        (index and sub-index).
+        The text is in hex, in the byte order of the bus. For the attributes `new` and `other` of an
+        object, the text is a value that a check may write to the object. Both values differ. For
+        `old`, the text is the value before the run. For `map`, the text is the entry by which a PDO
+        mapping contains the object. If the attribute is empty, the text is the multiplexer of the
+        object (index and sub-index).
 
         Raises:
             Unbound: the node has no object or value for this name.
@@ -241,7 +242,7 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return the text of a step with which its failure message begins.
+    """Return the beginning of the message that a step has failed: the text of this step.
 
     The text does not contain the expected abort codes. For a step about frames, the text is empty,
     because the failure message contains the expected frames.

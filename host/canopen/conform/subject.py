@@ -330,9 +330,10 @@ class Subject:
     """The node under test: what the tester has found out about it before the first check.
 
     Attributes:
-        binding: objects of the node by the names in checks.
+        binding: objects and PDOs of the node that are assigned to the names in checks.
         features: features that the node has.
-        names: texts and object addresses that replace the names in checks, by name.
+        names: helper that replaces a name in a step by a text or an object address. It uses
+            `binding`.
         about: properties that the node has reported, such as its device name, as texts by name.
         values: index and sub-index of each object that can be read and written.
         refused: mandatory objects that the node refuses to read.
@@ -348,8 +349,9 @@ class Subject:
     def missing(self, bound: BoundCheck) -> str | None:
         """Return the reason why a missing object prevents a check, or None if no object is missing.
 
-        If the node lacks a mandatory object, one check fails for this reason. The other checks that
-        need the object are not applied.
+        For each mandatory object, one check fails if the node lacks the object, such as UE-01 for
+        1000h. All other checks that need the object are not applied, and the reason is the result
+        of this method.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"

@@ -51,14 +51,14 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 def is_standard(at: Address, value: bytes) -> bool:
     """Return whether a value has the length that CiA 301 defines for its object.
 
-    Only COB-IDs and the numbers of mapped objects are compared with CiA 301. For other objects, the
-    result is True.
+    Only the lengths of COB-IDs and of the numbers of mapped objects are checked. For other objects,
+    the result is True.
     """
     return len(value) == (_bytes_of(at) or len(value))
 
 
 def is_too_long(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects is too large for its object."""
+    """Return whether a COB-ID or a number of mapped objects needs more bytes than it may have."""
     return bool((size := _bytes_of(at)) and value[size:].strip(b"\0"))
 
 

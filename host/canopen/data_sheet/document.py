@@ -75,10 +75,10 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return the letters that the first non-ASCII byte of a line may represent, as a text.
+        """Return a text that lists the letters that the first non-ASCII byte of a line may mean.
 
-        An EDS does not name its encoding, so the byte represents another letter in each possible
-        encoding.
+        The text is part of a finding. An EDS does not name its encoding, and the byte means another
+        letter in each possible encoding.
         """
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
@@ -95,7 +95,10 @@ class Document:
         return self._subs.get(index, [])
 
     def entries(self, index: int) -> list[EntryDescription]:
-        """Return the entries of an object by sub-index, or an empty result without the object."""
+        """Return the entries of an object by sub-index.
+
+        The list is empty if the file lacks the object.
+        """
         return self._entries.get(index, [])
 
     def section_of(self, row: EntryDescription) -> str:
@@ -164,7 +167,10 @@ class Document:
         return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
-        """Return the `KEY=VALUE` lines of a section, or of the first section with this title."""
+        """Return the `KEY=VALUE` lines of a section.
+
+        If several sections have the same title, these are the lines of the first one.
+        """
         return [line for line in self._blocks.get(section, ()) if line.is_keyword]
 
     def _read_blocks(self) -> dict[str, list[EdsLine]]:

@@ -202,14 +202,15 @@ class BootTalk:
         tries: int = 1,
         answered: bool = True,
     ) -> Script[None]:
-        """Write an object of the slave. If the slave refuses or does not answer, the boot-up ends.
+        """Write an object of the slave. If the slave refuses the write, the boot-up ends.
 
         Args:
             write: object and value to write.
             status: error status with which the boot-up would end.
             what: text for the reported step. By default, it is the object and the value.
             tries: number of attempts if the slave does not answer.
-            answered: whether a missing answer ends the boot-up.
+            answered: whether the slave must answer. If True, a missing answer ends the boot-up. If
+                False, the boot-up continues without the answer.
         """
         what = what or f"{write.index:04X}h:{write.sub:02X} := {_as_hex(write.data)}"
         try:
@@ -383,7 +384,7 @@ class BootOutcome:
 class SlaveBoot:
     """The boot-up of one slave by the master, as CiA 302-2 defines it.
 
-    As in Lely's master, two functions are missing:
+    Like the CANopen master of the Lely library, this class lacks two functions:
 
     - the object 1F20h, which contains a DCF as text
     - the boot-up of a slave that another node configures (1F25h)

@@ -50,7 +50,8 @@ class _Named(dict[str, V]):
 class CanopenMaster(Closing):
     """CANopen master that boots, starts and monitors the slaves of a bus, with PDOs and drives.
 
-    Time passes only in its methods, such as `boot` or `wait_until`, which do all work that is due.
+    The master works only while one of its methods runs, such as `boot` or `wait_until`. Such a
+    method does all work that is due in the meantime.
 
     Args:
         link: connection to the bus, such as `bench.link` or a `CanLink`. The master closes it at
@@ -160,8 +161,8 @@ class CanopenMaster(Closing):
         """Return a text that explains the latest boot-up of a slave, and when the slave was lost.
 
         The text has a line for each request of the boot-up with its answer, and a line for the
-        outcome. Losses of the slave and messages after a loss have further lines. All lines are in
-        the order of time.
+        outcome. Further lines report each loss of the slave, and the first boot-up or heartbeat
+        message that the slave sends after a loss. All lines are in the order of time.
 
         Args:
             name: name or node-ID of the slave.
@@ -252,7 +253,8 @@ def open_master(
         The master. Close it, or use it in a `with` block.
 
     Raises:
-        OSError: the bus.yml cannot be read, or a software file that it names cannot be read.
+        OSError: the bus.yml cannot be read. Another cause is that the bus.yml names a file with
+            software for a slave, and this file cannot be read.
         ImportError: PyYAML is not installed.
         ValueError: the file has errors. The message lists all errors, each with its line.
         TypeError: the link is a serial line.

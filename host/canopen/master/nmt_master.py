@@ -54,8 +54,8 @@ class ProcessData:
     def tick(self, now_us: int, *, sync: bool) -> None:
         """Read and write the drives whose period begins now.
 
-        No period begins before the slaves have booted for the first time, because the drivers of
-        ros2_canopen wait for them.
+        No period begins before the slaves have booted for the first time. This behaviour is as in
+        ros2_canopen, whose drivers wait for the slaves.
 
         Args:
             now_us: current time in microseconds.

@@ -25,8 +25,9 @@ class ProcessImage:
     """Values of the objects in the PDOs of one slave, as the master has received or written them.
 
     Values are 0 until they are received or written. When an object is written, the RPDO that
-    contains the object is sent. A synchronous RPDO is sent with each n-th SYNC instead. If an RPDO
-    also contains objects that have not been written, they are sent as 0, as in Lely's master.
+    contains the object is sent. A synchronous RPDO is sent with a SYNC instead: with each n-th SYNC
+    if its transmission type is n. If an RPDO also contains objects that have not been written,
+    these objects are sent as 0. The CANopen master of the Lely library does the same.
 
     The inhibit times, event timers and deadlines of the master are not emulated.
 

@@ -99,7 +99,9 @@ class SdoClient:
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
-        """Run a script of SDO requests with the node. Return its result, or raise its error.
+        """Run a script of SDO requests with the node, and return the result of the script.
+
+        If the script raises an exception, this method raises the same exception.
 
         Raises:
             LinkClosed: the connection to the bus is lost.
@@ -184,7 +186,9 @@ class SdoFrames:
             self.answer(f"{head:02X}{part:.<14}")
 
     def read_other(self, at: Address, data: str) -> None:
-        """Read an object of at most 4 bytes, whose value must differ from `data`.
+        """Read an object of at most 4 bytes, and fail if the object still has the value `data`.
+
+        The value `data` is in hex, in the byte order of the bus.
 
         Raises:
             StepFailed: the object has the value `data`.
@@ -205,8 +209,9 @@ class SdoFrames:
     def download(self, at: Address, data: bytes) -> None:
         """Send the first request of an SDO download.
 
-        This request contains a value of 1 to 4 bytes itself (expedited transfer). For a longer
-        value, it contains the number of bytes that follow in segments.
+        If the value has 1 to 4 bytes, the request contains the value (expedited transfer). For any
+        other value, the request contains only the number of bytes, and the bytes follow in
+        segments.
         """
         mux = bytes.fromhex(multiplexer(at))
         if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:

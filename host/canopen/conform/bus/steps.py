@@ -36,7 +36,8 @@ class StepPlayer:
         node_id: node-ID of the node, 1..127.
         stimulus: function that operates the inputs of the device, or None if the user gave no
             stimulus.
-        client: SDO client for steps in which the check does not judge the single frames.
+        client: SDO client for the steps `Hold` and `RefuseRewrite`. For the other SDO steps, the
+            player checks each frame.
     """
 
     def __init__(

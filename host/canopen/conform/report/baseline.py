@@ -67,7 +67,8 @@ class Baseline:
     def ends_with(self, report: verdict.Report) -> int:
         """Return the exit status of `canmon conform`. Known failures do not count as failures.
 
-        If the run ended early, the reason decides: Ctrl-C, or a failure of the bus.
+        If the run ended early, the result is `verdict.CTRL_C` after Ctrl-C, and
+        `verdict.BUS_FAILED` after a failure of the bus.
         """
         if report.aborted and not report.absent:
             return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED

@@ -41,7 +41,7 @@ _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber"
 
 
 def number(document: Document, section: str, key: str) -> int | None:
-    """Return the number at a keyword of a section, or None if it is not a 32-bit number."""
+    """Return the value of a keyword in a section, or None if the value is not a 32-bit number."""
     found = eds_number(document.file.value(section, key))
     return None if found is None or found.bit_length() > _WIDEST else found
 

@@ -92,7 +92,10 @@ _COUNTED: Final = re.compile(r"NrOfEntries|Lines|ProductVersion|ProductRevision"
 
 
 def is_number(section: str, key: str) -> bool:
-    """Return whether the value of a keyword is a number, whatever the object's data type is.
+    """Return whether the value of a keyword is always a number.
+
+    The result is False for a keyword such as DefaultValue, whose value is a number or a text, as
+    the data type of its object requires.
 
     >>> is_number("DeviceInfo", "VendorNumber"), is_number("1600Value", "NrOfEntries")
     (True, True)

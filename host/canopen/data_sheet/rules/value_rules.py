@@ -66,7 +66,11 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
-    """Return the data type of the value in a line, such as DefaultValue, or None without one."""
+    """Return the data type of the number in a line that gives a value of an object.
+
+    An example is the line `DefaultValue=5`. For other lines, and for values that are not numbers,
+    the result is None.
+    """
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = eds_value.object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():

@@ -34,7 +34,8 @@ _Load = float
 def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
     """Return a warning if the PDOs and SDO polling of the drives in a bus.yml overload the bus.
 
-    The number of bits of each frame is calculated for data bytes of 0.
+    The number of bits of a frame depends on its data, because of stuff bits. It is calculated for
+    data bytes that are all 0.
     """
     notes, master = BusFileNotes(), bus.master
     if master is not None:

@@ -44,7 +44,8 @@ class DriveSettings:
     Attributes:
         channel: name of the joint, and scales and offsets of its values.
         axis: number of the axis. 0 is the first axis of the device.
-        switching_state: state of the drive (CiA 402) in which its mode of operation is changed.
+        switching_state: CiA 402 state to which the drive is switched before its mode of operation
+            is changed.
         homing_us: longest duration of homing, in microseconds.
     """
 
@@ -72,9 +73,10 @@ def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
 
 
 def period_us_of(slave: BusSlave) -> int:
-    """Return the period in microseconds in which ros2_canopen reads and writes a drive.
+    """Return the period in microseconds in which a drive is read and written.
 
-    The result is 0 if ros2_canopen reads and writes the drive with each SYNC.
+    The bus.yml contains this period for the drivers of ros2_canopen, and this master uses the same
+    one. The result is 0 if the drive is read and written with each SYNC.
     """
     if not _number(slave, "polling", 1):
         return 0
@@ -110,8 +112,8 @@ async def home(
         name: name of the joint, for messages.
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
-        caught_up: function that returns an operation. The operation waits for a statusword that the
-            drive has sent after receiving the latest controlword.
+        caught_up: function that waits until the drive, after receiving the latest controlword, has
+            sent a statusword. It returns an operation to await.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.

@@ -80,8 +80,8 @@ _ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
     """Return the state to which a drive must switch next on its way to a wanted state.
 
-    The state Operation enabled is reached through the states before it. Any other wanted state is
-    the result itself.
+    If the wanted state is Operation enabled, the result is the next state on the way. If another
+    state is wanted, the result is that state.
     """
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
