@@ -210,7 +210,8 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
 
     Args:
         options: bus options of the command line.
-        instead: other arguments that the user can give instead of a bus, for the message.
+        instead: other arguments that the user can give instead of a bus. The error message mentions
+            them if no bus is named.
 
     Returns:
         The bus, its interface and its channel.

@@ -82,7 +82,7 @@ def serving_control(
 ) -> Iterator[ControlServer]:
     """Context manager that creates a control socket and yields its server.
 
-    The server answers requests while the clock waits.
+    Whenever the clock waits, it calls the server, which answers the requests that have arrived.
 
     Args:
         path: path of the socket to create.

@@ -28,10 +28,10 @@ _PORT: Final = 2809
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """TCP address of an OpenRTM name server, or at which this process accepts connections.
+    """TCP address of an OpenRTM name server, or of this process for incoming connections.
 
-    CORBA has no access control. Anyone who can connect to the address can do everything that
-    rtshell can do.
+    OpenRTM communicates by CORBA, which has no access control. Anyone who can connect to the
+    address can do everything that rtshell, a tool of OpenRTM, can do.
 
     Attributes:
         host: IP address or host name.
@@ -73,7 +73,8 @@ def format_name(pattern: str, values: Mapping[str, str]) -> str:
 
     Args:
         pattern: format of OpenRTM such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
-        values: text for each letter after a percent sign, such as `n`.
+        values: texts that replace the percent signs and letters, by letter. The text for `n`
+            replaces `%n`.
 
     >>> format_name("%h.host_cxt/%n.rtc", {"h": "robot", "n": "ConsoleIn0"})
     'robot.host_cxt/ConsoleIn0.rtc'
@@ -172,8 +173,8 @@ def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
 
     Args:
         options: options of the command line by name.
-        topics: text of the command's default table of ports and topics. If it is empty, all ports
-            have a topic.
+        topics: default table of the command, as text. The table assigns topics of ROS 2 to ports.
+            If the text is empty, each port has a topic.
 
     Raises:
         Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 but the user did not

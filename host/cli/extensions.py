@@ -59,7 +59,7 @@ class ExtensionGroup(Generic[T]):
         raise ExtensionError(f"no {self.what} {name!r}; {near(name, self.names())}")
 
     def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Import all extensions of the group, and return them by name.
+        """Import all extensions of this group, and return them by name.
 
         An extension that cannot be loaded is left out and reported.
 

@@ -48,9 +48,9 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Context manager that turns errors of its block into a ClickException (exit status 1).
 
-    If an error has an attribute `status` of 3, the error becomes SourceFailed instead. The
-    attribute is the exit status of a process that the command started. Errors in writing standard
-    output are not changed.
+    An error may have an attribute `status`, the exit status of a process that the command started.
+    If this status is 3, the exit status of SourceFailed, the error becomes SourceFailed instead.
+    Errors in writing standard output are not changed.
     """
     try:
         yield
@@ -76,10 +76,11 @@ def refusing(
     For an OSError, the message contains the path and the reason of the error, as in `refuse_path`.
 
     Args:
-        what: invalid option or argument, with which the message starts.
-        wrong: class of the errors to turn into Refused. The text of the error follows in the
-            message.
-        path: file that is wrong, if the text of the error does not name it.
+        what: beginning of the message: the invalid option or argument.
+        wrong: class of the errors to turn into Refused. The message ends with the text of the
+            error.
+        path: file that contains the error. It is named in the message before the text of the error.
+            None if that text already names the file.
     """
     try:
         yield

@@ -153,15 +153,15 @@ run_code_option: Final[Decorator] = click.option(
 
 
 def works_in(path: str) -> Decorator:
-    """Return a decorator for a function that declares a command, whose code is imported later.
+    """Return a decorator for a command whose code is imported only when the command runs.
 
-    The decorated function has the parameters of the command and an empty body. Another function
-    with the same parameters does the work. Its module is imported only when the command runs,
-    because help and completion do not need it.
+    The decorated function declares the command: it has the parameters of the command and an empty
+    body. Another function with the same parameters does the work. The module of this other function
+    is imported only when the command runs, because help and completion do not need the module.
 
     Args:
-        path: location of the function that does the work, in the form `MODULE:NAME`. It returns the
-            exit status, or None for 0.
+        path: location of the function that does the work, in the form `MODULE:NAME`. The function
+            returns the exit status, or None for 0.
     """
 
     def decorate(described: Callable[..., Any]) -> Callable[..., Any]:

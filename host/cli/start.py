@@ -214,8 +214,8 @@ def standard_streams() -> Iterator[None]:
 def raise_of_output(error: Exception) -> None:
     """Raise an error again if it came from writing standard output. Otherwise do nothing.
 
-    After this call, the caller reports the errors of all other kinds. If the reader has closed the
-    pipe, as `| head` does, the command ends without a message.
+    If this function returns, the caller must report the error. If the reader has closed the pipe,
+    as `| head` does, the command ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]
@@ -253,12 +253,12 @@ def loading() -> Iterator[None]:
 class Interrupter:
     """Signal handler that raises KeyboardInterrupt, but not in the middle of an import.
 
-    An exception during an import may be lost, or leave a module half loaded. Therefore the handler
-    repeats a signal that arrives during an import, until the import has ended, for two seconds at
-    most.
+    An exception during an import may be lost, or leave a module half loaded. If a signal arrives
+    during an import, the handler therefore sends the signal to its own process again a little
+    later. It repeats this until the import has ended, for two seconds at most.
 
     Attributes:
-        pending: number of the signal that is being repeated, or 0.
+        pending: number of the signal that is sent again, or 0 if there is none.
     """
 
     def __init__(self) -> None:
@@ -315,9 +315,9 @@ def _is_importing(frame: FrameType | None) -> bool:
 def taking_signals(received: _Handler) -> Iterator[None]:
     """Context manager in which Ctrl-C (SIGINT), SIGTERM and SIGHUP call the function `received`.
 
-    SIGINT is handled even if it was ignored at the start, because a script starts a command before
-    `&` with SIGINT ignored. SIGHUP stays ignored if it was ignored at the start, because nohup
-    needs this.
+    SIGINT is handled even if it was ignored at the start, because a shell script that starts a
+    command in the background (`&`) makes the command ignore SIGINT. SIGHUP stays ignored if it was
+    ignored at the start, because nohup needs this.
     """
     numbers = [signal.SIGINT, signal.SIGTERM]
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

@@ -45,8 +45,8 @@ class ServingClock(RealClock):
 
     Attributes:
         serve: function that is called in each wait. Its argument is the time in microseconds that
-            it may take. It is called at least once per wait, so that a late run can still be
-            stopped.
+            it may take. It is called at least once per wait, even if the run is behind real time.
+            So a request to stop the run is still served.
     """
 
     serve: Callable[[int], None] | None = None

@@ -139,7 +139,8 @@ class StampClock:
 
         Args:
             stamp_s: time stamp of the driver in seconds, or 0 if it gives none.
-            polled_us: time of the last poll that found no frame.
+            polled_us: time of the last poll that found no frame. The frame arrived later, so the
+                result is not less than this time.
             now_us: time at which the frame was read.
         """
         stamp_us = round(stamp_s * 1e6)
@@ -505,9 +506,9 @@ class CanLink:
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for the next frame, then return all received frames with their arrival times.
 
-        The returned time is the time just before the last poll of the bus. If the process is
-        stopped after this poll, the caller can detect the delay by this time, and so does not count
-        nodes as silent.
+        The returned time is the time just before the last poll of the bus. The process may be
+        suspended after this poll. If the caller uses the returned time as the present time, it does
+        not count nodes as silent during the suspension.
 
         Args:
             timeout_us: longest wait in microseconds. 0 does not wait.

@@ -118,7 +118,10 @@ class StampedLink(Link[Frames], Protocol):
     """
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for the next frame. Return a time, and all frames that have arrived by this time.
+        """Wait for the next frame, then return all received frames with their arrival times.
+
+        The first returned value is the time up to which the bus was read. The second value contains
+        the frames that had arrived by this time.
 
         Raises:
             LinkClosed: the connection to the bus is lost.

@@ -68,8 +68,8 @@ class TerminalOutput:
 
     Args:
         descriptor: file descriptor of the terminal. The writer uses a duplicate of it.
-        caught_up: function that the thread calls when all queued text is written after some text
-            was dropped.
+        caught_up: function that the thread calls after text was dropped, as soon as all queued text
+            is written.
         lost: function that the thread calls when the terminal is gone.
 
     Attributes:

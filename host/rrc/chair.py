@@ -73,6 +73,8 @@ _STOPS: Final = frozenset(
 class ChairStopped(Exception):  # noqa: N818 - what happened
     """The wheelchair (VR2) is switched off, or it stopped while the program was driving it.
 
+    The program drives the wheelchair through a device, the RRC.
+
     Attributes:
         kind: event with which the RRC reported the stop, or None if there was no event.
     """

@@ -145,9 +145,9 @@ class RrcLoad:
     RRC are not included.
 
     Attributes:
-        load_pct: load in per cent: 30 for the RRC's own work, plus the cost of the lines.
-        margin_pct: remaining capacity in per cent, 100 minus `load_pct`. The client keeps 10 or
-            more free.
+        load_pct: load in per cent: 30 % for the RRC's own work, plus the load that the lines cause.
+        margin_pct: remaining capacity in per cent, 100 minus `load_pct`. The client keeps at least
+            10 % free.
         pace_lines_s: maximum number of lines per second without waiting for answers.
     """
 

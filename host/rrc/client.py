@@ -321,7 +321,8 @@ class RrcClient(Closing):
         """Set how the wheelchair responds to movements of its stick (command `joystick`).
 
         Args:
-            shape: the ten parameters of the command.
+            shape: parameters #1 to #10 of the command, such as the exponents of translation and
+                rotation.
         """
         self.command(shape)
 
@@ -382,8 +383,9 @@ class RrcClient(Closing):
         """Let this program drive. If the stick was driving, select the slowest speed mode first.
 
         The RRC manual advises the slowest speed mode whenever the driver changes, that is, between
-        the commands `limit` and `output`. The first command `output` after the change waits for the
-        confirmation. Select the wanted speed mode again afterwards.
+        the commands `limit` and `output`. The first command `output` after the change waits until
+        the RRC has confirmed the command. The slowest speed mode stays selected: if another one is
+        wanted, select it after this call.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.

@@ -68,9 +68,10 @@ class Arrival(Generic[_T]):
 class Inbox:
     """Store of the received events and status lines that the program has not read yet.
 
-    Replies to commands are not stored, but returned to the caller. Lines that the manual does not
-    list, and SA lines with a wrong CHECK, are kept in `unknown` and reported without an error,
-    because newer firmware or noise on the line can cause them.
+    Replies to commands are not stored, but returned to the caller. Some lines are kept in `unknown`
+    and passed to `on_unknown`: lines that the manual does not list, and status lines (SA) with a
+    wrong checksum (CHECK). They raise no exception, because newer firmware or noise on the line can
+    cause them.
 
     Args:
         on_unknown: function that is called with each unknown line.

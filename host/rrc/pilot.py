@@ -55,7 +55,8 @@ class PilotView:
         most_pct: limit of translation and rotation while the stick drives, in per cent.
         status: latest status line, or None while the wheelchair (VR2) is off.
         load: load of the RRC that this program causes.
-        lines: latest events and actions as `(time, mark, text)`.
+        lines: latest events and actions as `(time, mark, text)`. The mark is `<` for an event of
+            the RRC, `>` for an action of the user, and `!` for a problem.
     """
 
     now_us: int

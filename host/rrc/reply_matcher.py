@@ -153,9 +153,9 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time until which commands sent before a restart of the RRC may still get a reply, in us.
+        """Time until which the RRC may still answer commands from before its restart, in us.
 
-        The time is 0 if no such command is waiting.
+        The time is 0 if no such command waits for an answer.
         """
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
@@ -170,11 +170,10 @@ class _UnconfirmedCommands:
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Remove the command that an OK confirms, and return the newest command of that name.
+        """Process an OK: remove the oldest waiting command of a name, and return the newest one.
 
-        The OK confirms the oldest waiting command of that name, which is removed. The newest
-        waiting command of that name is returned, because the RRC executes it last and its values
-        will then apply.
+        The OK confirms the oldest waiting command of the name. The RRC executes the newest command
+        last, so its values will apply. If no command of the name is waiting, the result is None.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:
