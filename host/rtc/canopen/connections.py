@@ -158,8 +158,9 @@ class PdoLinks:
     def make(self, now_us: int, node_id: int) -> None:
         """Make the PDO links of a node that has just become ready.
 
-        If the node is only the source of a link, and the target was not reset, the link still
-        exists and is not made again.
+        A link is stored in the target, as the COB-ID of its RPDO. If the node is only the source of
+        a link, and the target was not reset, the link therefore still exists. Such a link is not
+        made again.
         """
         for link in self.links:
             if link.target.node == node_id:

@@ -58,7 +58,10 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Update the routing tables whenever an InPort of a new proxy gets or loses a connector."""
+        """Call `route` now, and whenever an InPort of a node's proxy gets or loses a connector.
+
+        This method is called for each new proxy.
+        """
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:
                 port.on_connect.append(lambda _: self.route())
@@ -119,9 +122,10 @@ class SdoDataFlow:
     """Transfer of values between objects of devices and ports by SDO.
 
     Objects are read for OutPorts of the proxies, and values at InPorts are written to objects.
-    Values are transferred while the proxy is Active and its device is Operational, at most once a
-    period for each port. One job transfers the values of all waiting ports of a proxy. The next job
-    begins in the period after the end of this job.
+    Values are transferred while the proxy is Active and its device is Operational. For each port,
+    at most one value is transferred per period. The transfer of the values of all waiting ports of
+    a proxy is one job. When a job has ended, the next job of the same proxy begins in the next
+    period.
 
     Args:
         nodes: nodes by node-ID.
@@ -152,7 +156,7 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Schedule a value for an InPort, without a connector.
+        """Schedule a value that an InPort gets from the caller instead of a connector.
 
         The value is written to the device in the next period.
 

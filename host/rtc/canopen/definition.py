@@ -47,7 +47,7 @@ PDO_CAN_IDS: Final = range(0x181, 0x6E0)
 
 
 class Role(StrEnum):
-    """Type of the device that a node is, which decides how its proxy controls it."""
+    """Type of a device. The type decides how the proxy of the device controls the device."""
 
     DEVICE_RTC = "device_rtc"
     DEVICE = "device"  # off-the-shelf, CiA 301 alone
@@ -168,7 +168,7 @@ class NodeEntry:
         eds: path of the node's EDS file, relative to the System Definition.
         role: type of the device: DeviceRTC, CiA 402 drive, or other CANopen device.
         heartbeat_ms: producer heartbeat time of the node.
-        ports: names of ports by PDO, such as `tpdo2`.
+        ports: names of ports by PDO. The key for the second TPDO is `tpdo2`.
         pdos: parameters that are written into PDOs, by PDO.
         restart: maximum number of successive restarts after the node was lost.
         sdo_ports: ports of objects that are transferred by SDO, by name.

@@ -74,8 +74,8 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     not checked. Components that do not exist are not checked either.
 
     Args:
-        server: server that gets proxies without devices. The server cannot be used otherwise
-            afterwards.
+        server: server that has the System Definition. The check adds proxies to it although there
+            are no devices. Afterwards, do not use this server for anything else.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():
@@ -142,8 +142,8 @@ def draw_graph(server: RtcCanopenServer) -> str:
     Connections through the PC are solid, and PDO links are dashed.
 
     Args:
-        server: server of the system. It cannot be used otherwise afterwards, as after
-            `check_offline`.
+        server: server of the system. Afterwards, do not use this server for anything else, because
+            `check_offline` has changed it.
     """
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}

@@ -246,7 +246,9 @@ class NodeOperations:
                 self._run("reset", self._life.reset(self._entry))
 
     def follow(self, state: NmtState, *, changed: bool) -> None:
-        """Move the proxy to the state of the device, unless a request will change that state.
+        """Move the proxy to the state that its device reported.
+
+        The proxy stays as it is while a request is waiting or running that will change the state.
 
         Args:
             state: NMT state that the device reported.
@@ -309,7 +311,8 @@ class NodeOperations:
         Return False if no restart is left.
 
         Args:
-            to_start: whether the node will be activated anyway, even without this restart.
+            to_start: whether the node will be activated anyway, even without this restart. If so,
+                it is not reported that no restart is left.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

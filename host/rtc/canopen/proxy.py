@@ -91,8 +91,9 @@ class PdoSource:
 class PdoSink:
     """An RPDO of a device, with the proxy's InPorts whose values are sent to the device.
 
-    Each value that arrives is sent in one frame. If each object has its own port, the frame has the
-    last values of the other objects.
+    An RPDO has either one InPort for all its objects, or one InPort for each object. For each value
+    that arrives at an InPort, one frame is sent. If the value is for one object only, the frame
+    also contains the last values of the other objects.
 
     Attributes:
         layout: layout of the PDO.
@@ -271,7 +272,7 @@ def lay_out_sdo_ports(
         data_types: data types in the node's EDS, by index and sub-index.
 
     Returns:
-        The layouts of the ports, and a text for each port that is not possible.
+        The layouts of the valid ports, and an error message for each invalid port.
     """
     made, refused = list[_SdoPortLayout](), list[str]()
     for name, port in entry.sdo_ports.items():

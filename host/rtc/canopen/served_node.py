@@ -103,12 +103,13 @@ class DuplicateNodeDetector:
             self.sign = f"{answer.index:04X}h:{answer.sub:02X} is {values}"
 
     def receive(self, at_us: int, state: NmtState, *, listening: bool) -> None:
-        """Check a boot-up or heartbeat frame of the node-ID for signs of a second node.
+        """Check a boot-up or heartbeat frame for signs that a second node has the same node-ID.
 
         Args:
             at_us: time of the frame on the bus in us.
             state: NMT state in the frame.
-            listening: whether nothing was sent to the node since it booted.
+            listening: whether the server has sent nothing to the node since the node booted, in
+                order to find out whether there is a second node.
         """
         before, self._state = self._state, state
         if state is NmtState.INITIALISING:

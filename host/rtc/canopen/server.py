@@ -115,7 +115,10 @@ class ServerObjects:
         self._indices = frozenset(index for index, _ in self._table)
 
     def answer(self, data: bytes) -> bytes | None:
-        """Return the SDO response to a request. For an abort or any other frame, return None."""
+        """Return the SDO response to a request.
+
+        If the data are an abort, or no SDO request, the result is None.
+        """
         try:
             request = sdo.parse_request(data)
         except WireError:

@@ -136,11 +136,12 @@ class PendingTransfer(Generic[_T]):
     The caller checks `done` from time to time.
 
     Args:
-        empty: value of `data` until the transfers have ended.
+        empty: initial value of `data`.
 
     Attributes:
         done: whether the transfers have ended.
-        data: values that were read, or `empty` after a write.
+        data: values that were read. Before the end of the transfers, and after a write, it is
+            `empty`.
         problem: reason for a failure, empty if the transfers did not fail.
     """
 
@@ -165,8 +166,8 @@ class PendingTransfer(Generic[_T]):
 class ServerView:
     """Interface by which the editor reads the state of a CANopen server and sends it commands.
 
-    Use it between the ticks of the server and in the server's thread. Commands return at once, and
-    their results appear later in the states and events.
+    Call its methods only in the server's thread, and not during a call of `RtcCanopenServer.tick`.
+    Commands return at once, and their results appear later in the states and events.
 
     Args:
         server: server to view.

@@ -107,8 +107,8 @@ class Project:
     Attributes:
         profile: component with its ports.
         node_id: node-ID in the System Definition.
-        strict_cia301: whether an NMT command can move the component out of Error, as in CiA 301
-            (DECISION K9).
+        strict_cia301: whether an NMT command can move the component out of its Error state, as in
+            CiA 301 (DECISION K9).
     """
 
     profile: RtcProfile

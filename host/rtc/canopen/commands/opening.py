@@ -169,7 +169,10 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield a function that writes server events to the log file. Without a file, yield nothing."""
+    """Yield a function that writes server events to the log file.
+
+    Without a log file, the iterator is empty.
+    """
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
     elif log is not None:
