@@ -58,9 +58,10 @@ class _WatchedPort:
 class Probes:
     """Probes that read the values of OutPorts for the user, and write the user's values to InPorts.
 
-    Each probe is a port that belongs to no component, and has a connector of its own. The file of a
-    saved system does not contain these connectors. A connector that injects a value ends as soon as
-    the value has been read.
+    A probe is a port that belongs to no component. A connector joins each probe with the port to be
+    read or written. When a system is saved, its file does not contain these connectors. When a
+    probe has written a value, the connector of the probe ends as soon as the InPort has read the
+    value.
 
     Args:
         manager: manager with the ports.

@@ -114,8 +114,8 @@ def draw(
 
     Args:
         boxes: components of the system.
-        edges: connectors of the system. If the component of a port is not in `boxes`, it gets an
-            additional box.
+        edges: connectors of the system. If `boxes` lacks the component of a port, this component
+            gets an additional box.
         columns: width of the screen in cells. If the drawing would be wider, all boxes are in one
             column.
         lit: styles of highlighted boxes and ports, by name. The line of a connector has the style

@@ -184,7 +184,9 @@ class _ArrivalBuffer(RingBuffer[P]):
         Any thread may call.
 
         Returns:
-            The status that `write` would return, and whether no other value was waiting.
+            The status that `write` would return, and whether the value is now the only one that
+            waits for the thread. If so, the caller must make the thread move the values into the
+            buffer.
         """
         options = self._options
         with self._lock:
@@ -241,7 +243,8 @@ class _SendBuffer(RingBuffer[P]):
     def put_back(self, value: P) -> None:
         """Put a value that could not be sent back to the front of the buffer.
 
-        If the buffer is full, one value is lost.
+        If the buffer is full, one value is lost: with the policy OVERWRITE, the value that could
+        not be sent; with another policy, the newest value in the buffer.
         """
         with self._lock:
             full = len(self._values) == self._options.length
@@ -303,8 +306,8 @@ class InPortPushConnector(_InPortConnector[T, P]):
         end: settings on which both processes agree.
         codec: codec that decodes the values.
         calls: queue that runs calls in the manager's thread.
-        post: function that schedules a call in that thread before the next tick. By default, each
-            value wakes up the thread.
+        post: function that schedules a call in that thread before the next tick. If it is None,
+            each value wakes up the thread instead.
 
     Raises:
         RtcRefused: the port has a connector with this ID, or a property is invalid.
@@ -363,7 +366,10 @@ class _PulledBuffer(RingBuffer[T]):
 
     @property
     def readable(self) -> bool:
-        """Whether `read` finds a new value. If not, a value is requested from the other process."""
+        """Whether `read` finds a new value.
+
+        If there is no new value, reading this property also requests one from the other process.
+        """
         found = len(self._values) > self._skip
         if not found:
             self._request()
@@ -508,10 +514,10 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         """Encode a value that the OutPort writes, and put it into the buffer of values to send.
 
         Returns:
-            INVALID_ARGS if the value cannot be encoded. If the buffer does not accept the value,
-            the result is the status of the buffer. If the buffer accepts the value, the result is
-            what the other process returned for the value that was sent last: PORT_OK, an error such
-            as BUFFER_FULL, or CONNECTION_LOST if the process did not answer.
+            INVALID_ARGS if the value cannot be encoded, or the status of the buffer if the buffer
+            does not accept the value. Otherwise, the value is sent later, so the result is about
+            the previous value that was sent. It is the status that the other process returned, such
+            as PORT_OK or BUFFER_FULL, or CONNECTION_LOST if the process did not answer.
         """
         try:
             payload = self._codec.encode(value)

@@ -217,7 +217,8 @@ def attach_lite(
 
     Args:
         manager: manager of the system.
-        word: value of the option, `NAME=URL[@BAUD][,rtno][,boot=TIME]`. The proxy is named `NAME0`.
+        word: value of the option, `NAME=URL[@BAUD][,rtno][,boot=TIME]`. With `rtno`, the device is
+            a board with RTno. The proxy is named `NAME0`.
         stack: exit stack that closes the line.
         boot_us: pause in us after the line is opened, unless the word has `boot`.
         rate_hz: rate of the proxy in Hz, or None for 10 Hz.

@@ -343,7 +343,10 @@ class RtcLiteProxy(RtComponent):
                 context.abort_component(self)
 
     def on_initialize(self) -> ReturnCode:
-        """Read the profile of the device, bring it to Inactive, and make the same ports."""
+        """Read the profile of the device, and bring the device to Inactive.
+
+        The proxy gets the same ports as the device.
+        """
         for port in tuple(self.ports.values()):
             self.remove_port(port)
         self._channel = RequestChannel(self._link, self._settings)

@@ -144,7 +144,8 @@ class TimeOptimalSpin:
     Attributes:
         alpha: angular acceleration in rad/s2.
         step_s: time in s from one command to the next.
-        latency_s: time in s from the measurement of a heading to the effect of the command for it.
+        latency_s: time in s from the measurement of a heading until the command calculated from
+            this heading takes effect.
     """
 
     alpha: float

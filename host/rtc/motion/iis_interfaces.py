@@ -49,7 +49,10 @@ class _Adapter(RtComponent, Generic[S, T]):
 
 
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
-    """Component that converts velocity commands from phase 1 to phase 2 of the IIS interfaces."""
+    """Component that converts velocity commands from phase 1 to phase 2 of the IIS interfaces.
+
+    IIS are the common interfaces of mobile robots, which exist in three phases.
+    """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
 
@@ -99,7 +102,10 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
-        """Return the position in phase 3, heading in 0..2 pi, or None if a number is invalid."""
+        """Return the position in the form of phase 3, or None if a number is invalid.
+
+        The heading of the result is in 0..2 pi.
+        """
         if not ports.plausible(value.x, value.y, value.theta):
             return None
         pose = Pose(value.x, value.y, positive(value.theta))

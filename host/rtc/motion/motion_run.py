@@ -218,7 +218,7 @@ class TrackMap:
 
 
 class LiveMap:
-    """Map of a moving cart on a terminal, which is drawn again at regular intervals of samples.
+    """Map of a moving cart on a terminal, which is drawn again after a fixed number of samples.
 
     A line below the map shows time, pose and velocity.
 

@@ -83,8 +83,9 @@ def run_umbmark(
     """Run a UMBmark test: drive squares in both directions, and return the errors of the odometry.
 
     Args:
-        begin: function that starts run number n, from 0 on, with a cart at the origin and active
-            components.
+        begin: function that prepares a run and returns the connection to the cart. Its argument is
+            the number of the run, from 0 on. The function must place the cart at the origin and
+            activate the components.
         true_pose: function that measures the position of the cart at the end of a run.
         runs: number of runs in each direction.
         side_m: side length of the squares in m. UMBmark has 4 m.

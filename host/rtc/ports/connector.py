@@ -237,9 +237,10 @@ class _Publisher(Generic[T]):
 class Connector(ConnectorBase, Generic[T]):
     """Connection between two data ports, which moves values from an OutPort to an InPort.
 
-    The InPort can read a value as soon as it is written if the dataflow type is `pull`, or if it is
-    `push` with the subscription type `flush`. With the subscription types `new` and `periodic`, the
-    value waits until a tick of the schedule pushes it.
+    With the dataflow type `pull`, the InPort can read a value as soon as the value is written. With
+    the dataflow type `push`, this depends on the subscription type. With `flush`, the InPort can
+    read the value as soon as the value is written. With `new` and `periodic`, the value waits until
+    a tick of the schedule pushes the value.
 
     Args:
         profile: name, ID, ports and properties of the connector.

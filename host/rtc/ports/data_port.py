@@ -71,7 +71,8 @@ class OutPort(DataPort[T]):
         Returns:
             PORT_OK if all connectors accepted the value, or if there are no connectors. Otherwise,
             the status of the first connector that did not accept it: BUFFER_FULL, BUFFER_TIMEOUT or
-            INVALID_ARGS. The result is PORT_ERROR if the write exceeds a limit of the node.
+            INVALID_ARGS. If the `guard` of the port does not allow the value, the result is
+            PORT_ERROR.
 
         Raises:
             TypeError: the value has another type than the port.

@@ -17,7 +17,8 @@ class ConnectorProfile:
         name: name of the connector, for display.
         connector_id: ID that is unique in a system.
         ports: full names of both ports, such as `ConsoleIn0.out`. The port that provides the values
-            is first. A port in another process has the name that its engine uses.
+            is first. A port in another process has the name that it has in its middleware, such as
+            OpenRTM.
         properties: properties of the connector. Those of data ports begin with `dataport.`.
     """
 
@@ -128,7 +129,10 @@ C = TypeVar("C", bound=ConnectorBase)
 
 
 class PortGuard(Protocol):
-    """Limits that a node sets for a port. The port asks its guard before it connects or sends."""
+    """Object that enforces the limits of a node, such as an emulated T-Kernel node, for a port.
+
+    The port asks its guard before the port is connected, and before it sends a value.
+    """
 
     def admit(self, connector: ConnectorBase, /) -> None:
         """Raise RtcRefused if the port may not have this additional connector."""

@@ -123,8 +123,9 @@ class RingBuffer(Generic[T]):
         """Remove the next value from the buffer and return it. The read policy selects the value.
 
         Returns:
-            The value. If there is no new value, the result is the value that was read last with the
-            empty policy `readback`, otherwise None.
+            The value. If there is no new value, the result depends on the empty policy. With the
+            empty policy `readback`, the result is the value that was read last. With any other one,
+            the result is None.
         """
         values, skip = self._values, self._skip
         if len(values) <= skip:

@@ -116,9 +116,10 @@ class ConnectorPlace:
 
     Attributes:
         orb: ORB of this process.
-        calls: queue that runs calls in the manager's thread.
+        calls: queue that runs calls in the manager's thread, also between two ticks.
         threads: threads that call other processes, for all data ports.
-        post: function that schedules a call in the manager's thread before the next tick.
+        post: function that schedules a call in the manager's thread. The call waits until just
+            before the next tick.
         connector_id: ID of the connector.
         name: name of the connector, for display.
         peer: name of the port in the other process, for display.
@@ -154,7 +155,7 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve the CORBA object that the other process will call, if it makes the calls.
+        """Serve a CORBA object for the other process, if the other process makes the calls.
 
         Args:
             values: properties of the connector.
@@ -445,10 +446,10 @@ class ServiceEnd(ConnectorEnd):
         return found
 
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Connect the local port with a port that represents the port in the other process.
+        """Connect the local port with a new port, which represents the other process.
 
-        The representing port provides the services of the other process, and passes each call on to
-        that process.
+        The new port provides the services of the other process, and passes each call on to that
+        process.
         """
         peer = ServicePort(self._place.peer)
         for provider in self._port.providers:

@@ -106,10 +106,11 @@ class AttachedContexts:
     """CORBA operations of a component on its execution contexts, local and foreign ones.
 
     Another process attaches its own execution context to the component, and gets a handle. It then
-    calls `on_activated`, `on_execute` and so on with that handle. The callback of the component
-    gets an object for the foreign context as its argument, whose time is the time of the manager.
-    The other process manages the rate and the states. If the other process calls with the handle of
-    a local context, the result is PRECONDITION_NOT_MET.
+    calls `on_activated`, `on_execute` and so on with that handle. The argument of the component's
+    callback is then an object that represents the foreign context. The time in this object is the
+    time of the manager. The rate and the states of a foreign context are managed by the other
+    process. If the other process calls with the handle of a local context, the result is
+    PRECONDITION_NOT_MET.
 
     Args:
         component: component that owns the contexts.
@@ -297,7 +298,7 @@ class ExecutionContextServant:
 
     Args:
         context: execution context to serve.
-        owner: component with which the context ends, or None.
+        owner: component that owns the context, or None. When the owner ends, the context ends too.
         references: references of the components.
     """
 

@@ -36,9 +36,9 @@ _USUAL: Final = {
 class Peers:
     """Makes the connectors of a system to components in other processes, and renews lost ones.
 
-    Each connector is checked once a second, in its own thread. A connector that could not be made,
-    or whose other process restarted, is made again. A connector that was ended while the other
-    process ran is not made again.
+    Each connector is checked once a second, in its own thread. A connector is made again if it
+    could not be made before, or if the other process has restarted. If a connector was ended
+    although the other process still runs, for example by a tool, it is not made again.
 
     Args:
         ports: ports of the system.

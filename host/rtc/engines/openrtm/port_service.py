@@ -95,8 +95,8 @@ class _PeerConnections:
             peer_name: name of the other port, for display.
 
         Returns:
-            The connection for `keep` or `drop`, or None if both ports are local, because local
-            ports are connected at once.
+            The new connection, which is the argument of `keep` or `drop`. If both ports are local,
+            the connector is complete at once, and the result is None.
 
         Raises:
             RtcRefused: the connector cannot be made.
@@ -154,9 +154,10 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connection with an ID, before this connection is ended by the peer or a tool.
+        """Return the connection with an ID, which the peer or a tool is about to end.
 
-        The connection is marked, so that the peer is not notified of an end that the peer knows.
+        The connection is marked, so that the peer is not notified of the end. The peer already
+        knows that the connection ends.
 
         Returns:
             Two values: the connection, or None if there is none, and whether the ID is known. An ID

@@ -38,14 +38,16 @@ class Stubs:
     The names in these modules are known only at run time, so their type is `Any`.
 
     Args:
-        modules: modules by name, including modules of skeletons (`RTC__POA`).
+        modules: modules by name, including the modules that contain skeleton classes, such as
+            `RTC__POA`.
 
     Attributes:
         sdo: IDL module `SDOPackage`.
         rtc: IDL module `RTC`.
         openrtm: IDL module `OpenRTM`, with the component and data ports.
         rtm: IDL module `RTM`, with the manager.
-        services: interface `RefHard`, which does not belong to an IDL module.
+        services: module with the interface `RefHard` of the RH3 base (Reference Hardware 3). In the
+            IDL, this interface is in no module.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:

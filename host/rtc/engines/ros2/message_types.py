@@ -30,8 +30,9 @@ class Stamps:
     The times of the system count from its start, and the time stamps of ROS count from 1970.
 
     Values with equal times get equal stamps, for example a pose and its transform. If the time of a
-    value differs by more than 1 s from the time of the system, the value gets the current time. If
-    a system runs late, its values keep the times at which they were due.
+    value differs by more than 1 s from the time of the system, the present time of the system is
+    used instead. If a system runs behind real time, the stamps of its values are the times at which
+    the values were due, not the times at which they were written.
 
     Args:
         now_us: function that returns the time of the system in us.

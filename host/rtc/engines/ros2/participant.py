@@ -210,7 +210,9 @@ _UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
 
 
 class OwnEndpoint(Protocol):
-    """Interface of a topic writer or reader in this process.
+    """Writer or reader of a topic in this process, as the participant sees it.
+
+    The participant compares each such endpoint with the matching endpoints in other processes.
 
     Attributes:
         entry: port and topic that the endpoint connects.

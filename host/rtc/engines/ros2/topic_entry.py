@@ -53,7 +53,7 @@ class TopicEntry:
 
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return the default entry for a message type, with its default frame names and stop time."""
+    """Return an entry for a message type, with default coordinate frames and `stop_after_us`."""
     stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")

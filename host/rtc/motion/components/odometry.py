@@ -19,9 +19,10 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 class Odometry(RtComponent):
     """Component that estimates the pose of a cart (middle of the drive axle) from wheel angles.
 
-    The motion is integrated on exact arcs. The component has a port LocalizedPosition that it does
-    not use, as in the RH3 specification. A message is ignored if an angle is not a number, or if
-    the message has too few angles for the configured wheel IDs.
+    The motion is integrated on exact arcs. The port LocalizedPosition exists only because the RH3
+    specification (Reference Hardware 3) defines it. The component does not use this port. A message
+    is ignored if an angle is not a number, or if the message has too few angles for the configured
+    wheel IDs.
 
     Attributes:
         pose: estimated pose of the cart.
