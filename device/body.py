@@ -107,8 +107,9 @@ class Contact:
     def roll(self, turn_rad: float, step_s: float) -> float:
         """Turn the wheel by an angle; return the distance that it rolls over the ground, in metres.
 
-        The wheel turns at a steady speed. It slips if friction cannot change its speed over the
-        ground fast enough.
+        The wheel turns at a steady speed during the step. Friction limits how fast the speed of the
+        wheel over the ground can change. If this speed cannot follow the speed of the wheel's rim,
+        the wheel slips.
         """
         rim_m_s = turn_rad * self.radius_m / step_s
         speed_m_s = rim_m_s
@@ -149,7 +150,7 @@ class BodyParameters(Immutable):
     """Parameters of a body on driven wheels: its kind, dimensions, mass and friction.
 
     Attributes:
-        kind: kind of body, a key of `SIDES`, which lists the wheels of each side.
+        kind: kind of body: `differential` with two wheels, or `skid-steer` with four wheels.
         wheel_radius_m: radius of each wheel, in metres.
         tread_m: distance between the left and the right wheels, in metres.
         mass_kg: mass on the driven wheels. Each wheel carries the same share.

@@ -187,7 +187,8 @@ class LineView(ScrollView, can_focus=True):
 def rounded_up(total: int) -> int:
     """Round the height of a view up, so that the height seldom changes while lines arrive.
 
-    Each change needs a new layout, which takes long.
+    Each change needs a new layout, and a layout takes long. The step of the rounding is a power of
+    two that grows with the height.
 
     >>> rounded_up(50), rounded_up(1_001), rounded_up(100_000)
     (50, 1008, 100352)

@@ -22,8 +22,8 @@ class UrgScan:
             so it wraps.
         first: measurement step (direction) of the first distance.
         cluster: number of steps that are combined into one distance.
-        distances_mm: distances in mm as received. A value below DMIN is an error code, not a
-            distance.
+        distances_mm: distances in mm as received. A value below the smallest distance that the
+            sensor measures (`specification.nearest_mm`) is an error code, not a distance.
         specification: limits and number of steps of the sensor.
     """
 

@@ -53,7 +53,8 @@ class _CanopenPort(Generic[T]):
 
         Args:
             entries: entries of the dictionary, one for each element of the value.
-            event: function that is called with an entry to send the TPDOs that contain it.
+            event: function that sends the TPDOs of an entry. The port calls this function with the
+                entry when the entry is to be sent.
         """
         self.entries, self._event = entries, event
 
@@ -368,13 +369,16 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     def run(self) -> None:
         """Run the periodic callback of the present state, such as `on_execute`.
 
-        If the callback returns an error, the component changes to the state Error (M5, M6).
+        If the callback returns an error, the component changes to the state Error (transitions M5
+        and M6 of the life cycle).
         """
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)
 
     def finalize(self) -> None:
-        """End the component for good, and run the callbacks for its end (M11).
+        """End the component for good, and run the callbacks for its end.
+
+        This is transition M11 of the life cycle.
 
         Afterwards the node sends nothing until its supply has been cut and restored.
         """

@@ -203,8 +203,9 @@ class Entry(Part):
     def force(self, data: bytes) -> None:
         """Set the value from inside the device, as if the bus had written it.
 
-        The access right, the limits and the `guard` are not checked. The service that owns the
-        object is notified by `written`.
+        The access right and the limits are not checked, and the function `guard` of the entry is
+        not called. The function `written` of the entry is called. Thereby the service to which the
+        object belongs learns of the write.
         """
         self.assign(data)
         if self.written is not None:
@@ -340,10 +341,10 @@ class Dictionary(Part):
 
     Attributes:
         description: names, types, access, limits and defaults of the entries.
-        by_multiplexer: cache of readable entries. The key is the three bytes of the multiplexer in
-            an SDO frame.
-        answers: cache for SDO uploads: the entry, its bytes and the SDO frame that answers, by the
-            same key.
+        by_multiplexer: cache of readable entries. The key of an entry is its multiplexer: the three
+            bytes with index and sub-index in an SDO frame.
+        answers: cache of the answers to SDO uploads. The key is the multiplexer. A cached item has
+            the entry, the bytes of its value, and the SDO frame with these bytes.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.wire.canopen.eds.object_table import RW

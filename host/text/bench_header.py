@@ -26,7 +26,11 @@ class WireType(StrEnum):
 
 
 class Place(StrEnum):
-    """Where a trace was recorded: at the devices in each tick, or at the port of the host."""
+    """Where a trace was recorded: at the emulated devices, or at the port of the host.
+
+    At the devices (`DEVICE`), the times in the trace are times of ticks. At the port with which a
+    host is connected (`PORT`), they are the times of the traffic at this port.
+    """
 
     DEVICE = "device"
     PORT = "port"
@@ -51,8 +55,8 @@ class DeviceEntry:
 
     Attributes:
         wire: name of the wire to which the device is connected.
-        type: device type, model, EDS or DCF file, or `FILE.py:Class`. It is empty if a program made
-            the device, which a replay cannot rebuild.
+        type: device type, model, EDS or DCF file, or `FILE.py:Class`. The text is empty for a
+            device object that was made by Python code. A replay cannot rebuild such a device.
         config: settings of the device.
         node_id: node-ID of a CANopen node, or None for another device.
         sha256: SHA-256 of the file in `type`.

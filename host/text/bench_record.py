@@ -54,9 +54,13 @@ BUS_STATE: Final = {
 class BenchRecord(NamedTuple):
     """One line of a trace of version 2: traffic, a change of an input, or the end of the recording.
 
+    A mark in the line shows its type: `>` for traffic to the device, `<` for traffic from the
+    device, `!` for a change at the device, such as a new input value or a reset, `~` for a fault of
+    the wire that starts or ends, and `.` for the end of the recording.
+
     Attributes:
         at_us: time of the tick, or time at the host's port, in microseconds.
-        name: name of the device. In a `~` line, it is the name of the wire.
+        name: name of the device, or name of the wire in a line with the mark `~`.
         mark: character that defines the type of the line.
         traffic: bytes or CAN frame of a `>` or `<` line.
         text: text of a `!` or `~` line.

@@ -43,10 +43,10 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the known name that is most similar to a misspelled one.
+    """Return a list with the known name that is most similar to a misspelled one.
 
-    The result is an empty list if no name is similar. Case is ignored. If two names differ only in
-    their numbers, they are not similar.
+    The list is empty if no name is similar. Case is ignored. If two names differ only in their
+    numbers, they are not similar.
 
     >>> closest("EPOS", ["epos", "rrc"]), closest("stik", ["left/stick", "right/stick"])
     (['epos'], ['left/stick'])

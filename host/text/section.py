@@ -211,7 +211,7 @@ class Field:
     """Definition of a key in a TOML file of the user: how its value is converted and described.
 
     Attributes:
-        field: function that checks and converts the value.
+        field: function that checks the value of the key and converts it.
         values: description of the allowed values, for the user.
         text: description of the key, for the user.
         default: default value as text for the user, empty if the key is required.
@@ -242,7 +242,9 @@ class Notes:
     Attributes:
         document: parsed file, which gives the line of each value.
         mistakes: errors found until now.
-        names: names to use in messages for values at certain keys. It is empty for a rig file.
+        names: texts that replace keys in error messages. The mapping has the path of a key and its
+            text. Keys without such a text are shown as in the file. For a rig file without a
+            bus.yml the mapping is empty.
     """
 
     document: TomlDocument

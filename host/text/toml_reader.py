@@ -106,7 +106,10 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table for one key of a header's path. For an array, return its last table.
+        """Return the table in this table that one key of a header such as `[a.b]` names.
+
+        A missing table is created. If the key names an array of tables, the last table of the array
+        is returned.
 
         Raises:
             _TakenError: the key has a value that is not a table.
@@ -141,10 +144,13 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table for the first part of a dotted key such as `a.b = 1`.
+        """Return the table in this table for the first part `a` of a dotted key such as `a.b = 1`.
+
+        A missing table is created.
 
         Raises:
-            _TakenError: the key has a value that is not a table, or a table with a header.
+            _TakenError: the key has a value that is not a table, or its table has a header such as
+                `[a]`. TOML does not allow dotted keys to add to such a table.
         """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:

@@ -103,8 +103,8 @@ def replacing(path: Path) -> Iterator[Path]:
     path is yielded.
 
     Raises:
-        OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged. An
-            OSError of the block is raised in the same way.
+        OSError: the file cannot be written, or the code in the `with` block has raised an OSError.
+            The attribute `filename` of the exception is `path`, and the file is unchanged.
     """
     from tempfile import mkdtemp  # noqa: PLC0415 - slow, and a TAB needs none
 

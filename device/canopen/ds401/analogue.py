@@ -276,9 +276,10 @@ def _read(entry: Entry) -> bytes:
 class AnalogueInput(Part):
     """One analogue input channel: converts and scales its value, and detects its events.
 
-    Integer limits and deltas are right-aligned, in the unit of the widest integer object of the
-    channel. REAL32 limits and deltas are in the unit of 6403h. If the device has no objects for
-    limits and deltas, each change of the value is an event.
+    A channel can have several integer objects, such as objects of 8 and of 16 bits. Integer limits
+    and deltas are numbers in the unit of the widest of these objects. REAL32 limits and deltas are
+    in the unit of the object 6403h. If the device has no objects for limits and deltas, each change
+    of the value is an event.
 
     Attributes:
         number: number of the channel, 1..254.
@@ -389,10 +390,10 @@ def _justified(counts: int, from_bits: int, to_bits: int) -> int:
 class AnalogueOutput(Part):
     """One analogue output channel: drives its level from the objects that the bus writes.
 
-    Integer error values are right-aligned: they are in the unit of the object and limited to its
-    range. If several objects contain the value of the channel, the object that changed last sets
-    the level, and the other objects keep their values. A NaN or infinity leaves the level
-    unchanged.
+    An integer error value is a number in the unit of the object that contains the value of the
+    channel. It is limited to the range of this object. If several objects contain the value of the
+    channel, the object that changed last sets the level, and the other objects keep their values. A
+    NaN or infinity leaves the level unchanged.
 
     Attributes:
         number: number of the channel, 1..254.

@@ -74,11 +74,13 @@ MEASURES: Final[Mapping[int, Measure]] = {
 class ActualValues(Part):
     """The objects of a drive that show actual values, such as position, velocity and current.
 
-    A value is computed when the object is read. Only objects with watchers are computed in each
-    tick. This saves time, because most objects are seldom read.
+    A value is computed when its object is read. Watchers are functions that are called when the
+    value of an object changes. An object with watchers is computed in each tick. The other objects
+    are not, which saves time, because most objects are seldom read.
 
     Args:
-        drive: drive whose `measures` compute the values.
+        drive: drive that supplies the values. Its attribute `measures` has a function for each
+            index.
         dictionary: dictionary of the drive, which may lack some of the objects.
 
     Attributes:
@@ -94,9 +96,10 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Store the present values in the objects.
+        """Store the present values in the objects, before the drive changes something.
 
-        Reads return the stored values until `renew` is called at the end of the tick.
+        Reads return the stored values until `renew` is called at the end of the tick. So the bus
+        does not read a value from the middle of a tick.
         """
         if not self._kept:
             for entry in self._entries:

@@ -85,7 +85,8 @@ def command_of(controlword: int) -> Command | None:
 class Automaton(Part):
     """The state machine of a drive (CiA 402), which follows the controlword and faults.
 
-    Before transitions 5 and 8 it brakes the motor if the option codes require that.
+    If the option codes require it, the motor is braked before the drive leaves the state Operation
+    enabled to Switched on (transition 5) or to Ready to switch on (transition 8).
 
     Args:
         stopping: object that brakes according to the option codes.
@@ -146,7 +147,9 @@ class Automaton(Part):
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
     def run(self) -> bool:
-        """Run one control period while the mode of operation is not active, as in a quick stop.
+        """Run one control period in which the state machine moves the motor, as in a quick stop.
+
+        The drive calls this method instead of its mode of operation while the mode is not active.
 
         Returns:
             True if the drive has no work until an input changes.
@@ -207,7 +210,8 @@ class Bounds(Immutable):
         winding_dc: highest temperature of the winding, in 0.1 degC.
         winding_warning_dc: temperature of the winding from which the drive warns, in
             0.1 degC.
-        stall_us: time for which the motor may stand at a limit although motion is demanded, in us.
+        stall_us: time for which the motor may stand although a motion is demanded or its current is
+            limited, in us.
     """
 
     supply_mv: tuple[int, int] = (9_000, 36_000)
@@ -224,10 +228,11 @@ class Supervision(Part):
         bounds: limits within which the drive reports no fault.
 
     Attributes:
-        wired: faults that the electronics detect from the present inputs.
+        wired: faults that physical inputs cause directly, such as a short circuit or an unplugged
+            encoder.
         has_supply: whether the supply voltage is high enough (bit 4 of the statusword).
         waiting: whether a time-out is running, after which a fault would be reported.
-        not_following: whether the following error is larger than 6065h.
+        not_following: whether the following error is larger than its window, the object 6065h.
     """
 
     def __init__(self, axis: Axis, bounds: Bounds) -> None:

@@ -179,7 +179,8 @@ tick."""
 class Axis(Part):
     """An axis of a drive: its motor, its demanded motion, and the conversion to units of the user.
 
-    Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
+    Positions in units of the user are INTEGER32. At an end of the position range limit (607Bh),
+    they continue at the other end.
 
     Attributes:
         motor: the motor.
@@ -343,12 +344,12 @@ class Stopping(Part):
         return self.brake(self._parameters.number(index))
 
     def brake(self, ramp: int) -> bool:
-        """Brake for one control period with a deceleration of the drive.
+        """Brake the motor for one control period on the ramp that an option code chooses.
 
         Args:
-            ramp: ramp according to an option code, a member of `Ramp`: none, with the profile
-                deceleration, with the quick stop deceleration, or as hard as the current limit
-                allows.
+            ramp: value of a member of `Ramp`. The member chooses one of four ways: not to brake, to
+                brake with the profile deceleration, to brake with the quick stop deceleration, or
+                to brake as hard as the current limit allows.
 
         Returns:
             True if the motor stands or does not need to be slowed down.

@@ -240,8 +240,9 @@ class Ds402(Application):
     def goes_on_plainly(self) -> bool:
         """Whether the next ticks only continue the motion of the mode of operation.
 
-        Several ticks can then be computed at once. The value is false if an input has changed, a
-        time-out runs, a watcher needs each value, or a limit switch could act.
+        Several ticks can then be computed at once. The value is false in each of these cases: an
+        input or a setting has changed, a time-out runs, an actual value has watchers and is
+        therefore needed in each tick, or a limit switch could act.
         """
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free
@@ -368,7 +369,10 @@ class Ds402(Application):
         super().request()
 
     def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
-        """Apply ticks that `Stretch` has computed ahead, as if they had been run one by one.
+        """Bring the drive to the state after ticks that were computed ahead.
+
+        A `Stretch` computes several ticks of the drive at once. Afterwards the state is the same as
+        if the ticks had been run one by one.
 
         Args:
             ticks: number of computed ticks.

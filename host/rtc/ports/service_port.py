@@ -27,8 +27,9 @@ class Provider(Generic[T]):
 class Consumer(Generic[T]):
     """An interface that a service port requires, such as `Consumer[RefHard]("refhard", "RefHard")`.
 
-    Once the port is connected, the component calls the methods of `service`. These are plain method
-    calls in the same thread. An exception of the provider is raised in the caller.
+    Once the port is connected, the attribute `service` is the object (servant) of the provider, and
+    the component calls the methods of this object. The calls are plain method calls in the same
+    thread. If a method of the provider raises an exception, the component receives the exception.
     """
 
     def __init__(self, instance_name: str, type_name: str) -> None:

@@ -29,8 +29,10 @@ class CallQueue:
     """Queue of calls from other threads, which the manager's thread executes between its ticks.
 
     Other threads use it because only the manager's thread may access a manager. A `ServingClock`
-    calls `serve` while it waits for the next tick. If the manager's thread also serves a control
-    socket, `LineServer.attach(queue, queue.make)` serves both.
+    calls `serve` while it waits for the next tick. The manager's thread may also serve a control
+    socket with a `LineServer`. In this case the thread calls `attach(queue, queue.make)` of the
+    server once. Then the server waits for this queue, too, and calls `queue.make` to execute the
+    waiting calls.
     """
 
     def __init__(self) -> None:
@@ -155,11 +157,12 @@ class Arrivals:
     """Queue of values received by other threads, which are processed at the start of the next tick.
 
     No code reads a value before the next tick. Therefore an arriving value does not wake the
-    manager's thread, which saves processor time. The queue is an item of a `Schedule`.
+    manager's thread. This saves processor time. The queue is an item of a `Schedule`, which
+    processes the queue in each tick.
 
     Attributes:
-        due_us: due time of the queue, which is always `NEVER`. The values wait until a tick is due
-            for another reason.
+        due_us: time of the next tick that the queue needs for itself. It is always `NEVER`: the
+            queue requests no tick, so the values wait for a tick that is due for another reason.
     """
 
     due_us: Final = NEVER

@@ -47,7 +47,8 @@ class Edge:
     Attributes:
         source: full name of the port where the arrow begins, such as `ConsoleIn0.out`.
         target: full name of the port where the arrow ends.
-        dashed: whether the arrow is dashed, because the data bypass the PC.
+        dashed: whether the arrow is drawn dashed. Dashed arrows are PDO links: one CANopen node
+            sends the data directly to another node, without the PC.
     """
 
     source: str

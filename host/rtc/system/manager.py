@@ -100,8 +100,8 @@ class RemoteEntry:
 
     Attributes:
         name: name of the component in the system, such as `Joystick0` in `Joystick0.out`.
-        path: path under which the engine finds the component, such as
-            `localhost:2809/robot.host_cxt/Joystick0.rtc`.
+        path: path of the component for the code that connects to the other process (the engine,
+            such as OpenRTM-aist). An example is `localhost:2809/robot.host_cxt/Joystick0.rtc`.
     """
 
     name: str
@@ -408,8 +408,9 @@ class Manager(Schedule):
 
         Args:
             first: full name or path of one port, such as `ConsoleIn0.out`.
-            second: full name or path of the other port. If that port belongs to another process,
-                use its name in the profile of the connector.
+            second: full name or path of the other port. If the other port belongs to another
+                process, give the name of the port that is listed in `profile.ports` of the
+                connector.
 
         Raises:
             RtcRefused: there is no such port, or the ports are not connected.

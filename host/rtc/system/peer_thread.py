@@ -129,9 +129,10 @@ class PeerCaller(Protocol):
 class PeerThreads:
     """A pool of threads that make the calls of many connectors to components in other processes.
 
-    Each connector makes one call at a time. While all calls are answered at once, a single thread
-    makes them, which saves processor time. If calls have to wait, a second thread is started. Each
-    call that hangs starts a further thread.
+    Each connector makes one call at a time. As long as every call is answered quickly, a single
+    thread makes all calls. This saves processor time. If calls have to wait too long, a second
+    thread is started. A thread whose call gets no answer is blocked. Such a thread is not counted,
+    so that another thread can be started in its place.
 
     Args:
         name: name of the threads, for the log.

@@ -28,9 +28,9 @@ class Schedule:
     `run_to` and `run_for` call `tick` without waiting. In real time, `RealTime` waits and calls
     `tick`.
 
-    A tick has four steps. First the additional items run. Then the execution contexts run in the
-    order in which they were added. Then connectors push their values. At the end deferred calls
-    run.
+    A tick has four steps. First the schedule ticks the items that were added with `add_item`. Then
+    the execution contexts run in the order in which they were added. Then connectors push their
+    values. At the end the schedule calls the functions that were passed to `defer` during the tick.
 
     Attributes:
         now_us: time of the latest tick in us.

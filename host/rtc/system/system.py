@@ -97,8 +97,9 @@ def describe(manager: Manager) -> System:
 def restore(manager: Manager, system: System) -> None:
     """Create the components and connectors that a system description lists, in a manager.
 
-    Components that are marked as active are activated. Connectors to remote components are added to
-    `manager.remotes`, and an engine makes them later.
+    Components that are marked as active are activated. Connectors to components in other processes
+    are only listed in `manager.remotes`. Later the code that connects to other processes (an
+    engine, such as OpenRTM-aist) makes these connectors.
 
     Raises:
         RtcRefused: a component or connector cannot be created. All created components are then

@@ -24,6 +24,9 @@ _MOST_CHARACTERS: Final = 200
 class Contents:
     """Information that a service has about the place of a ucode marker.
 
+    A ucode is an identifier of 128 bits, and a ucode marker is the object that carries it. The
+    component `ContentsInterpretation` fetches this information.
+
     Attributes:
         x_m: x coordinate of the place in m.
         y_m: y coordinate of the place in m. The y axis points to the left of the x axis.
@@ -45,8 +48,8 @@ class ContentsInterpretation(Lookup[Contents]):
     - `place` out: the ucode, then `name=value` of each property
 
     The information at an address is a JSON object with the numbers `x_m` and `y_m`. Its other
-    members are properties. The report (Fig. 123) names the component and its cache. The rest is an
-    addition.
+    members are properties. The NEDO report (Fig. 123) only names the component and its cache.
+    tickrig has defined the ports and the JSON object.
 
     Args:
         instance_name: name of the component.

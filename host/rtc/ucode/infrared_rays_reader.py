@@ -45,8 +45,8 @@ class UcodeReaderClient:
 
     The client starts the reader and receives the result of each round. A round with a lost or
     garbled line is dropped. After each second without a valid line, the client starts the reader
-    again. Data that arrived before the start are dropped, because the robot was at another place
-    then.
+    again. When the client is made, it discards the bytes that have already arrived, because the
+    robot may have moved since then.
 
     Args:
         link: line to the reader.

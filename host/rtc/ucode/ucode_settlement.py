@@ -22,10 +22,12 @@ _MOST_CHARACTERS: Final = 1_000
 class UcodeSettlement(Lookup[str]):
     """Component that asks a service for the address of the information about a ucode.
 
-    The ports are `ucodes` in, and `addresses` out. A value of `addresses` alternates ucodes and
-    their addresses. The service has the address as text under `SERVICE/ucodes/UCODE`. Invalid
-    ucodes are counted in `invalid_ucodes`. The report (Fig. 123) names the component and its cache.
-    The rest is an addition.
+    The in-port is `ucodes`, and the out-port is `addresses`. A value of `addresses` contains each
+    ucode followed by its address. To find an address, the component reads the URL
+    `SERVICE/ucodes/UCODE`. `SERVICE` is the URL in the configuration parameter `service`, and
+    `UCODE` is the ucode. The answer is the address as text. Invalid ucodes are counted in
+    `invalid_ucodes`. The NEDO report (Fig. 123) only names the component and its cache. tickrig has
+    defined the rest.
 
     Args:
         instance_name: name of the component.

@@ -80,7 +80,8 @@ class CyclicPosition(_LatchedSetPoint):
     The torque offset, and an extrapolation of the motion when SYNC is late, are not emulated.
 
     Attributes:
-        rests: whether the mode counts as idle when the target is the present position.
+        rests: whether the drive may rest while the target is the present position. The flag is true
+            for this class and false for subclasses that do work in each tick.
     """
 
     shows_following_error = True
