@@ -117,8 +117,9 @@ class CallbackRunner(Generic[C]):
 class Timer:
     """Timer that determines when the periodic callback of a component runs.
 
-    It is an execution context (RTC-Lite type 22h, DeviceRTC). The periods are counted from the
-    start of the timer, so the timer does not drift. Missed periods are skipped.
+    It is the execution context of a DeviceRTC, and of an RTC-Lite component whose execution context
+    has the type 22h (a timer of the device). The periods are counted from the start of the timer,
+    so the timer does not drift. Missed periods are skipped.
 
     Attributes:
         rate_hz: number of periods in a second. A new rate applies from the next start.
@@ -180,7 +181,9 @@ def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
 
 
 def shown(value: Any) -> float | str:
-    """Return the value of a port in the form in which it is shown as a physical output.
+    """Return the value of a data port as a number or text for display.
+
+    The emulated device lists its ports among its physical outputs, which a user can read.
 
     A boolean becomes a number, and a sequence becomes a text with blanks.
     """

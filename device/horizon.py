@@ -15,9 +15,10 @@ class Horizon(Part):
 
     Attributes:
         passed_us: time up to which all ticks are done.
-        until_us: time up to which a device may compute its ticks ahead. Until this time the rig
-            observes only the traffic of the device. Only an action of the event queue may read the
-            device between its ticks.
+        until_us: time up to which a device may compute its ticks ahead. Until this time, the rig
+            does not read the device in each tick, and sees only the frames that the device sends
+            and receives. Only a scheduled action of the rig (an action of the event queue) may read
+            the device earlier, between two ticks.
     """
 
     passed_us: int = 0

@@ -44,8 +44,10 @@ class InputSignal(Immutable):
         unit: unit of the value, or empty for a plain number.
         initial: value at the start of the rig.
         real: whether the input accepts fractions. A device keeps such an input in a `QuantityBank`.
-        counts: three numbers of the analogue converter: counts of its object at `low`, counts at
-            `high`, and counts of one step. Without a converter the tuple is empty.
+        counts: three numbers for an input with an analogue converter. They are in counts, the unit
+            of the device's object that shows the input: the count at `low`, the count at `high`,
+            and the counts of one step of the converter. The tuple is empty if the input has no
+            converter.
     """
 
     name: str

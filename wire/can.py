@@ -451,8 +451,8 @@ def fd_bits(frame: FdFrame) -> FdBits:
     """Return the length of a CAN FD frame in bits, with all stuff bits (ISO 11898-1).
 
     The bits from start of frame to the end of the data are stuffed as in classic CAN. The CRC field
-    has stuff bits at fixed positions. The first fixed stuff bit replaces a stuff bit that the last
-    data bits would need.
+    has stuff bits at fixed positions. If a stuff bit would be needed right after the last data bit,
+    the first fixed stuff bit takes its place.
     """
     data, length = frame.data, frame.dlc
     nominal, fast, state = _fd_head(frame.can_id, frame.extended, frame.flags, length)

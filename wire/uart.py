@@ -176,7 +176,8 @@ class UartReceiver:
 
         Args:
             level: level of the line, 1 or 0.
-            until_ps: end of the level. A time in the past is allowed.
+            until_ps: end of the level. The end may be earlier than the end of an earlier call; the
+                call then has no effect.
 
         Yields:
             The characters that are completed by this level.

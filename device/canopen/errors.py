@@ -150,11 +150,12 @@ _QUEUE_LENGTH: Final = 16
 class EmcyProducer(Service):
     """Sends an EMCY message when an error occurs, and another one when it is cleared (0000h).
 
-    An error is identified by its code and its text. 1001h is the union of the active errors, and
-    its generic bit is set while any error is active. The message at the end of an error contains
-    the register of the remaining errors. In the state Stopped and in bus-off, messages wait and are
-    sent afterwards. A reset clears all errors and waiting messages. Therefore a service must raise
-    its error again if the error still exists after the reset.
+    An error is identified by its error code and by the manufacturer-specific bytes of its message
+    (the argument `text`). 1001h is the union of the active errors, and its generic bit is set while
+    any error is active. The message at the end of an error contains the register of the remaining
+    errors. In the state Stopped and in bus-off, messages wait and are sent afterwards. A reset
+    clears all errors and waiting messages. Therefore a service must raise its error again if the
+    error still exists after the reset.
 
     Not emulated: 29-bit CAN-IDs.
     """

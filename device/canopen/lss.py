@@ -147,9 +147,10 @@ class LssSlave(Service):
             yield LSS_MASTER_COB_ID, self._receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Return the CAN-ID of the LSS master's frames.
+        """Return the CAN-ID of the LSS master's frames, which may reconfigure the slave.
 
-        Such a frame may give the slave a node-ID. The slave then boots and receives other CAN-IDs.
+        A frame of the LSS master may give the slave a node-ID. The slave then boots, and receives
+        frames with other CAN-IDs than before.
         """
         return (can_id for can_id, _ in self.handlers(state))
 

@@ -116,12 +116,13 @@ class Service(Copyable):
     """Base class of the communication services of a slave: SDO server, PDOs, SYNC and others.
 
     When a service is made, it searches the dictionary for its objects, and attaches its callbacks
-    to them (`Entry.guard`, `written`, `source`). If the dictionary lacks the object of the service,
-    the service is off.
+    to their entries. An entry calls its `guard` to check a value from the bus, its `written` after
+    a write by the bus, and its `source` to get the bytes for a read. If the dictionary lacks the
+    object of the service, the service is off.
 
     Attributes:
         node: slave that the service belongs to.
-        slot: position of the service in the order in which services act in a tick.
+        slot: number of the service. In a tick the services act in the order of these numbers.
         asked_us: time at which `tick` is due, or `NEVER` if it is not scheduled. `schedule` sets
             this time.
     """
@@ -183,8 +184,8 @@ class Service(Copyable):
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
         """Yield the CAN-IDs of frames that may change which CAN-IDs the slave receives.
 
-        After such a frame an acceptance filter lets all frames pass, until the slave has handled
-        it.
+        The emulated bus has an acceptance filter for each slave. After one of the frames above, the
+        filter of this slave lets all frames pass, until the slave has handled the frame.
 
         Args:
             state: present NMT state.

@@ -68,7 +68,8 @@ def make_slave(
         sdo: limits of the SDO servers.
 
     Returns:
-        A slave that boots in its first tick. Put the slave on a `CanWire` in a `Station`.
+        A slave that boots in its first tick. To run the slave, make a `Station` from the slave and
+        an end of a `CanWire`, and pass the station to a `Rig`.
 
     Raises:
         ValueError: the node-ID is invalid.

@@ -62,8 +62,8 @@ class Ground(Part):
 
     The path in each millisecond is an exact arc.
 
-    Castors, slopes and walls are not emulated. If a wheel slips, the force that is needed to turn
-    it does not change.
+    Castors, slopes and walls are not emulated. A slipping wheel needs the same force as a wheel
+    that does not slip, which is a simplification.
 
     Args:
         parameters: parameters of the base.

@@ -223,8 +223,9 @@ class Driver(Part):
 
         Args:
             last_request_us: time of the latest request of the master.
-            until_us: time up to which milliseconds may be run. `now_us` becomes the time of the
-                last millisecond that was run.
+            until_us: time up to which milliseconds may be run. If the call runs several
+                milliseconds, the attribute `now_us` of this object becomes the time of the last of
+                them.
 
         Returns:
             The speeds of the left and the right wheel in each millisecond, in counts/ms.

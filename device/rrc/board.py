@@ -132,13 +132,14 @@ class LoadAccount:
     ) -> None:
         """Update the backlog of work for one period in which the wheelchair (VR2) runs.
 
-        The work of this period is added, and the work that the RRC can do in a period is
-        subtracted.
+        The emulated RRC needs time for its work, and the backlog is the work that it has not
+        finished. The work of this period is added to the backlog, and the work that the RRC can do
+        in a period is subtracted.
 
         Args:
             line_feeds: number of received line feeds.
-            overflows: number of overflows of the receive buffer, plus one for each 256 further
-                discarded bytes.
+            overflows: number of overflows of the receive buffer. After an overflow, each block of
+                256 discarded bytes counts as one more overflow.
             replies: number of lines sent, except overflow errors and the status line.
             status: whether a status line was sent.
             extra_pct: work that a physical input adds, in per cent of a period.

@@ -23,9 +23,11 @@ _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
     """Count presses and releases of the speed and alarm buttons, and change the speed mode.
 
-    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So a button was pressed
-    or released if the parity of its counter differs from the state of the button. The counters
-    change whether or not the speed buttons are locked (DECISION R23).
+    Each button has a counter, which is odd while the button is pressed (fields #7 to #9 of the
+    status line SA in the RRC manual). If a button is pressed and its counter is even, the button
+    has just been pressed. If a button is not pressed and its counter is odd, it has just been
+    released. In both cases the counter is increased by 1. The counters change whether or not the
+    speed buttons are locked (DECISION R23).
 
     Returns:
         True if the alarm button has just been pressed.
@@ -72,7 +74,10 @@ class Gear(Enum):
 class Gearbox:
     """The gear that the RRC imitates in reverse modes 2 and 3.
 
-    The direction in which the stick leaves neutral chooses the gear.
+    The reverse mode of an RRC wheelchair controller determines how the wheelchair moves when the
+    stick is pulled back. In modes 2 and 3 there are a forward gear and a backward gear. The
+    wheelchair moves back only in the backward gear. The direction in which the stick leaves neutral
+    chooses the gear, and the gear is kept until the stick is in neutral again.
 
     Attributes:
         gear: the gear after the latest tick.
@@ -96,10 +101,12 @@ class Gearbox:
 
         Args:
             tick: number of the tick.
-            mode: reverse mode 0 to 3, from #7 of the command or from the buttons.
+            mode: reverse mode 0 to 3, from parameter #7 of the command `joystick` or from the
+                buttons.
             stick: translation and rotation as received, which choose the gear.
             shaped: translation and rotation after `shape`, which drive the motors (DECISION R18).
-            knobs: the command `joystick`, whose values #8 to #10 are used.
+            knobs: the command `joystick`. Its parameters #8 to #10 are used: the neutral radius and
+                the angles `switch_deg` and `fade_deg`.
         """
         v_pct, w_pct = shaped
         if mode == 0:
@@ -200,9 +207,11 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits of a `limit` command, with their signs.
 
     First translation and rotation are each limited to their own limit. Then both are multiplied by
-    the same factor, so that the direction of travel stays the same. The limits of sum, product and
-    radius each require a factor, and the smallest of these factors is used (RRC manual, `limit`).
-    All arithmetic is integer and rounds down (DECISION R19).
+    the same factor, so that the direction of travel stays the same. The command `limit` has limits
+    for the sum of both values, for their product, and for the radius (the root of the sum of their
+    squares). For each of these limits there is a largest factor with which the values stay within
+    the limit. The smallest of the three factors is used (RRC manual, `limit`). All arithmetic is
+    integer and rounds down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)

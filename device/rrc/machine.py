@@ -91,8 +91,9 @@ class ReceiveBuffer:
     Attributes:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
-        thrown_blocks: number of bytes that were discarded after an overflow up to the end of the
-            line, counted in blocks of `size` bytes.
+        thrown_blocks: number of whole blocks of `size` bytes that were discarded. After an
+            overflow, the discarded bytes are counted up to the end of the line. A rest of less than
+            `size` bytes is not counted.
     """
 
     size: int

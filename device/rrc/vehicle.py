@@ -45,7 +45,8 @@ class Vehicle:
         battery_wh: capacity of the battery.
 
     Attributes:
-        gauge: level that the physical input has set on the battery gauge, 1..10.
+        gauge: latest value of the physical input that sets the battery gauge, 1..10. Driving does
+            not change this value. Driving changes `charge`.
         speed_mm_s: true speed, which is positive forward.
         turn_mrad_s: true turning speed, which is positive to the right.
         distance_mm: distance along the path. Backing counts negative.

@@ -25,7 +25,8 @@ class LiteConfig(Immutable):
     """Configuration of an emulated RTC-Lite node: its framing, checksum and execution context.
 
     Attributes:
-        framing: framing of the line: frames of RTC-Lite, or packets of RTno (bridge mode).
+        framing: format of the data on the line: frames of RTC-Lite, or packets of RTno, a protocol
+            that is closely related to RTC-Lite. The use of RTno packets is called bridge mode.
         checksum: algorithm of the checksum (DECISION L5). Packets of RTno always use `sum8`.
         context: type of the execution context, which decides when `on_execute` runs.
         rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another rate.
@@ -57,9 +58,10 @@ _BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
 
 @dataclass(slots=True)
 class LiteServer:
-    """Executes the requests of a proxy on a PC in an RTC-Lite node, and returns the answers.
+    """Executes the requests that an RTC-Lite node receives, and returns the answers.
 
-    The server has no clock. The node calls `execute` when the timer's period has ended.
+    The node is an emulated device with a component. A proxy on a PC sends the requests. The server
+    has no clock. The node calls `execute` when the timer's period has ended.
 
     Attributes:
         life: life cycle of the component, with its state.

@@ -84,7 +84,10 @@ class GearParameters(Immutable):
 
     Attributes:
         ratio: number of motor turns per turn of the output shaft.
-        efficiency: share of the power of an external torque that the gear transmits, up to 1.
+        efficiency: share of the power of an external torque that the gear transmits, above 0 and up
+            to 1. If the torque acts against the motion, the motor must supply the torque divided by
+            `efficiency`. If the torque acts in the direction of the motion, only the share
+            `efficiency` of the torque reaches the motor.
         inertia_kg_m2: inertia at the output shaft, without the motor's own inertia.
         coulomb_nm: dry friction at the output shaft.
     """
@@ -125,8 +128,8 @@ class LoopGains(Immutable):
 
     Attributes:
         velocity_rad_s: natural frequency of the velocity loop.
-        damping: damping of the velocity loop. A damping of 1.5 becomes 0.47 at ten times the
-            inertia.
+        damping: damping ratio of the velocity loop. The damping ratio falls when an additional
+            inertia is attached: 1.5 becomes 0.47 if the total inertia is ten times as large.
         position_rad_s: bandwidth of the position loop.
     """
 

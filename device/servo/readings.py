@@ -37,8 +37,9 @@ _Temperatures = tuple[float, float]
 class ThermalModel(Part):
     """Thermal model of a motor: winding and housing, heated by the current in the winding.
 
-    The heat is R I^2, and R grows with the temperature. The system stays linear, so its state at
-    any later time is computed by a formula, without steps.
+    The heat is R I^2, and R is a linear function of the temperature. While the mean square of the
+    current stays the same, the differential equations are therefore linear in the temperatures. So
+    a formula gives the temperatures at any later time, without steps in between.
 
     The model does not include heat from friction and iron, the gear, the power stage and moving
     air.
@@ -269,10 +270,12 @@ class Heat(Part):
 class ServoSettings(Copyable):
     """Settings of a servo that may change while it runs, such as supply, load and faults.
 
-    Setting another value calls `changed`.
+    When a setting gets another value, the method `changed` is called. A subclass overrides this
+    method to apply the settings.
 
     Attributes:
-        supply_mv: supply voltage of the power stage in millivolts, which `supply_v` sets.
+        supply_mv: supply voltage of the power stage in millivolts. It changes when `supply_v` is
+            set.
     """
 
     __slots__ = (

@@ -147,7 +147,8 @@ class Line(Part):
         velocity: present demanded velocity, in counts/s.
         goal: position at the end of the line, in counts.
         left: number of steps up to the goal.
-        added: velocity that is demanded in addition to the velocity of the line, in counts/s.
+        added: velocity offset that the master of the drive has set, in counts/s. It is added to the
+            velocity of the line.
         most: largest velocity of the line, in counts/s. `run_ahead` ends before a step that needs
             more.
     """
@@ -310,15 +311,17 @@ class Servo(Readings):
     ) -> RunAhead:
         """Compute the next control steps ahead, without applying them.
 
-        The results are exactly the same as if each step were computed separately. The computation
-        ends before a step that needs separate treatment. In such a step friction stops or holds the
-        shaft, the demand is limited, the resistance of the motor changes, or the servo leaves the
-        bounds. Afterwards the servo can continue with single steps.
+        The results are exactly the same as if each step were computed separately. Some steps need
+        separate treatment, and the computation ends before the first of them. These are steps in
+        which friction stops or holds the shaft, in which the demand is limited, in which the
+        resistance of the motor is computed again, or after which the servo would be outside
+        `bounds`. The servo can continue with single steps.
 
         Args:
             line: demanded positions without acceleration, beginning with the present demand.
             most_steps: largest number of steps.
-            bounds: bounds within which the run may continue.
+            bounds: bounds of the position, the following error, the velocity and the temperature,
+                as described at `Bounds`.
         """
         # one loop over locals takes half the time of calls
         plant, loops, heat = self._plant, self._loops, self._heat

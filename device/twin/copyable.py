@@ -18,8 +18,9 @@ class Immutable:
     Copies of a machine within the process share such an object. A pickle contains its value.
 
     Attributes:
-        shared_by_twins: flag that is always true. Classes of wire/ have this attribute instead of
-            this base class.
+        shared_by_twins: flag that is always true. The code that copies a machine reads it. A class
+            in the package `tickrig.wire` has this attribute itself instead of this base class,
+            because that package does not import `tickrig.device`.
     """
 
     __slots__ = ()

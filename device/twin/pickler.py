@@ -51,7 +51,8 @@ def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
 
     Args:
         machine: the machine to copy.
-        begun: attributes that have the given values in the copy.
+        begun: attributes that the copy does not take over from the machine, by name, with their
+            values in the copy.
 
     Returns:
         The attributes of the machine by name. If some attributes are not in its `__dict__`, the

@@ -145,7 +145,7 @@ class Capture(Immutable):
         line: the command as received.
         first: first step (direction of a beam) to send.
         last: last step to send.
-        cluster: number of steps for each number in the answer.
+        cluster: number of steps that are combined into one distance in the answer.
     """
 
     line: bytes

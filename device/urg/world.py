@@ -38,8 +38,8 @@ class UrgParameters(Immutable):
 
     Attributes:
         serial: serial number of letters and digits.
-        noise: noise of the distances as a share of the sensor's accuracy (10 mm below 1 m, 1 %
-            above), 0..1.
+        noise: largest noise of a distance, as a share 0..1 of the sensor's accuracy. 0 means no
+            noise. The accuracy is 10 mm for distances below 1 m, and 1 % of longer distances.
         seed: seed of the noise.
         scip: protocol after power-up: 1.1 as in the URG-04LX, whose laser is then on, or 2.0 as in
             sensors such as the URG-04LX-UG01, whose laser is then off.
@@ -226,7 +226,7 @@ class Beams(Part):
         y_m: position of the sensor in y, in metres.
         rays: directions of the beams as unit vectors. Each direction is `tau / turn` after the
             previous one.
-        first_rad: direction of the first beam, within 2e6.
+        first_rad: direction of the first beam, in radians. Its absolute value is at most 2e6.
         turn: number of beams in a full turn. `rays` has at most this number.
     """
 

@@ -64,8 +64,9 @@ class EmulatorControl(RequestDispatcher):
     """Executes the requests of a control socket at one emulator, such as "set" or "fault".
 
     Args:
-        emulator: the controlled emulator. No other code may step it while a request is answered.
-            Only a `RunningEmulator` can show the lines on its wire.
+        emulator: the controlled emulator. No other code may step the emulator while a request is
+            answered. The request "lines", which shows the traffic on the wire, is available only if
+            the emulator is a `RunningEmulator`.
     """
 
     def __init__(self, emulator: _Controlled) -> None:
@@ -219,8 +220,8 @@ class RequestInbox:
 
         Returns:
             A future with the answers. If the emulator ends before it answers, the future raises
-            EmulatorEnded. It is not cancelled, because an event loop would then end the task that
-            waits for the future.
+            EmulatorEnded. The future is not cancelled in this case, because a cancelled future
+            would also cancel the asyncio task that waits for it.
         """
         from concurrent.futures import Future  # noqa: PLC0415 - slow
 

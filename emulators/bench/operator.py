@@ -194,8 +194,9 @@ class AssemblyFaults(Copyable):
     """The faults of a rig with several wires, and with CANopen nodes on them, under unique names.
 
     A fault of a wire has the name `WIRE/fault`, or its plain name if there is only one wire. A
-    fault of a node has the name `NODE/fault`. If there is only one device, its faults have their
-    plain names, except those with the name of a fault of the wire.
+    fault of a node has the name `NODE/fault`. If there is only one device, a fault of this device
+    has its plain name. If the wire has a fault with the same plain name, the fault of the device
+    keeps the name `NODE/fault`.
 
     Args:
         wires: wires by name.
@@ -226,7 +227,8 @@ class AssemblyFaults(Copyable):
             wire: name of the wire.
 
         Returns:
-            The names in this rig, by the names on the wire.
+            A mapping. The keys are the names of the faults without a prefix, and the values are the
+            names of the same faults in this rig, such as `WIRE/fault`.
         """
         bare = self._bare is not None
         return {
@@ -240,8 +242,9 @@ class AssemblyFaults(Copyable):
             node: name of the node.
 
         Returns:
-            The names in this rig, by the names at the node. The result is empty for an unknown
-            node.
+            A mapping. The keys are the names of the faults without a prefix, and the values are the
+            names of the same faults in this rig, such as `NODE/fault`. The mapping is empty for an
+            unknown node.
         """
         held = self._nodes.get(node)
         if held is None:
@@ -344,12 +347,13 @@ class Assembly(Copyable):
     """The physical inputs and outputs of several devices in one object, under unique names.
 
     If there is only one device, its signals have their plain names. With several devices a signal
-    has the name of its device as prefix: `left_drive/shaft_load_nm`.
+    has the name of its device as prefix: `left_drive/shaft_load_nm`. The argument `plain` exempts
+    one of the devices from the prefix.
 
     Args:
         parts: devices by name, at least one device.
-        plain: name of the device whose signals have their plain names without a prefix, if there
-            are several devices.
+        plain: name of the device whose signals have no prefix although there are several devices,
+            or None if the signals of all devices have a prefix.
     """
 
     def __init__(self, parts: Mapping[str, HasSignals], plain: str | None = None) -> None:
@@ -683,9 +687,9 @@ class Operator(Copyable):
             )
 
     def full_name_of(self, name: str) -> str:
-        """Return the name under which a fault is known here.
+        """Return the name of a fault as in `faults`, without an unnecessary prefix.
 
-        If there is only one node, the prefix with the name of the node is removed.
+        If there is only one node, `NODE/fault` becomes `fault`. Other names are returned unchanged.
         """
         bare = name.rpartition("/")[2]
         more = bare != name and name in self._wire.fault_types and name not in self.faults

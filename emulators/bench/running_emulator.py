@@ -92,8 +92,8 @@ class RunningEmulator(ABC):
     def effective_us(self) -> int:
         """Time at which an action of the operator takes effect.
 
-        It is the time of the next tick, or the present time if an action of the event queue is
-        running.
+        It is the time of the next tick. If the rig is just running a scheduled action from its
+        event queue, it is the present time.
         """
         if self.rig.acting_us is not None:
             return self.rig.acting_us
@@ -232,7 +232,8 @@ class Transcript:
         Args:
             now_us: present time.
             data: bytes to send.
-            shown: bytes to print.
+            shown: bytes to print instead of the data. They may lack a part that is the same in each
+                message, such as the line end or the CRC.
         """
         self.write(now_us, Mark.TO_DEVICE, escape(shown))
         self._sending = True

@@ -44,14 +44,15 @@ def dominant(frames: Sequence[CanFrame]) -> CanFrame:
 class CanArbiter(ArbiterFields):
     """Decides which nodes of an emulated CAN bus send next, by the identifiers of their frames.
 
-    All times are in the units of the segment.
+    All times are whole numbers of the unit that the `CanSegment` of the bus has chosen.
 
     Attributes:
         heads: a heap with a whole number for each node that has frames to send. The high bits are
             the priority of the first frame in the node's queue, and the low bits are the number of
             the node.
         free: earliest time at which a frame can start.
-        slow: whether a node has to wait even if the bus is free.
+        slow: whether a node may have to wait although the bus is free. Then `take_waiting` must be
+            called instead of the faster `take`.
     """
 
     __slots__ = ()
@@ -97,7 +98,11 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Remove and return the nodes that send next, while some other nodes may not send yet.
+        """Remove and return the nodes that send next, if some nodes are not allowed to send yet.
+
+        Such a node waits although the bus is free. It takes part in the arbitration only if its
+        wait has ended at the start of the frame. The method `take` is faster, but it ignores these
+        waits.
 
         Args:
             everybody: whether to choose all nodes that may send at the start of the frame. This is

@@ -249,8 +249,9 @@ class CanEnd(EndFields):
 class Babbler(CanEnd):
     """A faulty node ("babbling idiot") that sends all the time and ignores its error state.
 
-    This class is in this module because a class of a compiled module cannot derive from a class
-    with the fields of the kernel.
+    This class is defined next to its base class `CanEnd` for a technical reason. If the optional
+    kernel in C is installed, `CanEnd` has its fields from the kernel. A class in a module that
+    mypyc compiles cannot derive from a class with such fields.
     """
 
     __slots__ = ()

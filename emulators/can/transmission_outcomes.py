@@ -50,7 +50,8 @@ class BusyTime(BusyFields):
         Args:
             first: start of the time span.
             now: end of the time span.
-            present: start and end of the present frame.
+            present: start and end of the frame that is on the bus now. This frame is not recorded
+                yet, so the caller passes its times.
         """
         spans = (*self._spans, (self._since, self._until), present)
         busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
@@ -115,9 +116,10 @@ class TransmissionOutcomes(SegmentFields):
     """The possible outcomes of a transmission on an emulated bus, each as a method.
 
     The methods deliver frames, and update queues and error counters of the nodes. `CanSegment`
-    plans the transmission and chooses the method for its outcome. All times are counted in a unit
-    that is chosen so that a bit and a microsecond are whole numbers of units. Therefore only time
-    stamps are rounded, up to the next microsecond.
+    plans the transmission and chooses the method for its outcome. All times are whole numbers of a
+    unit. The unit depends on the bit rate: both a bit and a microsecond last a whole number of
+    units. Therefore the times are exact. Only the time stamps of frames, which are in microseconds,
+    are rounded up.
 
     Attributes:
         unit: number of units in a microsecond.

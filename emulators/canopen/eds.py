@@ -277,7 +277,8 @@ def fitting(row: EntryDescription, value: int) -> Value:
 
     Args:
         row: description of the entry.
-        value: the number. For an unsigned entry -1 means all bits set.
+        value: the number. For an unsigned integer entry, -1 stands for the largest number of the
+            data type, in which all bits are set.
     """
     low, high = row.low, row.high
     nearest: int | float = value
@@ -352,8 +353,9 @@ class EdsCache:
     """Cache of EDS and DCF files: reads each file once, and again when it has changed.
 
     Attributes:
-        others: other cached results, by their source. Each result is stored with the versions of
-            the files from which it was made.
+        others: cached results of functions that read several files, such as `read_bus`. The key is
+            the arguments of the function that determine the result, such as the path of the
+            bus.yml. Each result is stored with the versions of the files from which it was made.
     """
 
     def __init__(self) -> None:

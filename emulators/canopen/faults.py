@@ -560,8 +560,9 @@ class NodeFaults(Copyable):
 
     Attributes:
         station: the station of the node, as soon as the node has one.
-        listeners: functions that are called if the faults change frames, with the time, the
-            direction, the sent frames and the frames after the faults. A twin has no listeners.
+        listeners: functions that are called when faults have changed frames. The four arguments are
+            the time, the direction of the frames, the frames as they were sent, and the frames that
+            are left after the faults. A copy of the node (a twin) has no listeners.
     """
 
     fault_types: Mapping[str, FaultForm] = {

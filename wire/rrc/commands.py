@@ -25,7 +25,8 @@ class Parameter:
         width: number of hex digits, 1 or 2.
         low: smallest value. A value below 0 is written in two's complement.
         high: largest value.
-        values: all allowed values, by their hex digits in upper, lower or mixed case.
+        values: mapping from hex digits, as bytes, to the value of these digits. It has only allowed
+            values, and a key for each spelling of a value in upper, lower and mixed case.
     """
 
     __slots__ = ("high", "low", "values", "width")
@@ -248,7 +249,8 @@ class Joystick(Command):
     def after(self, former: Joystick) -> Joystick:
         """Return the joystick settings that apply after this command.
 
-        A value of #8 to #10 that is out of range does not change the former value (DECISION R14).
+        If one of the parameters #8 to #10 (`neutral_pct`, `switch_deg` and `fade_deg`) is out of
+        range, this parameter keeps its former value (DECISION R14).
 
         Args:
             former: settings before the command.

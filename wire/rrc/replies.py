@@ -61,7 +61,8 @@ class Ok:
 class Refusal:
     """Reply `ER:reason` of an RRC wheelchair controller: a command was refused.
 
-    The reason is the name of the command, or a fault of the line.
+    The reason is the name of the refused command, or one of the constants `COMMAND_CHECKSUM`,
+    `COMMAND_UNKNOWN` and `RECEIVE_BUFFER_OVERFLOW` of this module.
     """
 
     reason: str

@@ -91,7 +91,9 @@ def _define_methods(kind: Any) -> None:
 
 
 def define(source: str, scope: dict[str, Any]) -> None:
-    """Execute source text that defines functions, which was generated for the fields of a struct.
+    """Execute generated source text that defines functions, such as the `__init__` of a struct.
+
+    The caller generates the text from the names of the fields of the struct.
 
     Args:
         source: source text, which uses only names of fields and of `scope`.

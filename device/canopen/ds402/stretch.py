@@ -44,8 +44,10 @@ class Stretch(Part):
 
         Args:
             now_us: time of the present tick.
-            requested: whether a frame or an input caused the present tick. Otherwise the tick was
-                scheduled.
+            requested: whether a frame or an input caused the present tick. If true, the time since
+                the previous tick of this kind becomes the estimate of the quiet time, which limits
+                the number of computed ticks. If false, the drive itself had scheduled the present
+                tick.
 
         Returns:
             The duration of the computed ticks in microseconds, or 0 if none were computed.

@@ -225,8 +225,9 @@ def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -
 class PathFollower(Part):
     """Moves the reference of a drive along planned paths.
 
-    Each path begins at the reference of the previous tick. The follower notices if something else
-    has changed the reference, because the path is then no longer valid.
+    Each path begins at the reference of the previous tick. If other code has changed the reference,
+    the path is no longer valid: `kept` is then false, and the mode of operation has to plan a new
+    path.
 
     Args:
         reference: the reference of the drive.

@@ -137,9 +137,11 @@ _MAX_CURRENT_MA: Final = 10_000
 class References(Part):
     """The reference and the limits that the master writes to a motor core unit, in physical units.
 
-    On the bus the number 32767 stands for the full scale of an angle, velocity or current. If
-    6443h:01 is not 0, the error value 6444h:01 is used as the reference after a failure, until the
-    master sends a new reference.
+    A motor core unit is a CANopen slave that drives one motor (NEDO report). On the bus the number
+    32767 stands for the full scale of an angle, velocity or current. A communication error, such as
+    a lost heartbeat of the master, is called a failure here. If the error mode (object 6443h:01) is
+    not 0, the unit uses the error value (object 6444h:01) as its reference after a failure, until
+    the master sends a new reference.
 
     Args:
         node: the slave.
@@ -147,7 +149,7 @@ class References(Part):
 
     Attributes:
         entries: entries of the objects.
-        failed: whether no reference has arrived since the failure.
+        failed: whether there was a failure, and no reference has arrived since then.
     """
 
     def __init__(self, node: CanopenSlave, on_reference: Callable[[], None]) -> None:
@@ -358,9 +360,9 @@ _LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
 class Motion(Part):
     """Plans the motion of a motor core unit, and commands its motor each millisecond.
 
-    The motion is planned for one control tick at a time. Each action starts from the present
-    motion: from the planned velocity (or the measured velocity if none is planned), the measured
-    angle and the present current.
+    At the start of each control tick of 10 ms, the motion for this tick is planned. Each action
+    starts from the present motion: from the planned velocity (or the measured velocity if none is
+    planned), the measured angle and the present current.
 
     Args:
         shaft: the shaft after the gear of the motor.

@@ -207,7 +207,8 @@ class _MpdoQueue(TpdoMode):
     def put(self, key: object, frame: bytes | Entry) -> None:
         """Queue an MPDO, which is sent as soon as the inhibit time allows.
 
-        If an MPDO with the same key is already waiting, the new MPDO replaces it.
+        The key identifies the object whose value the MPDO carries. If an MPDO with the same key is
+        already waiting, the new MPDO replaces it.
         """
         self._waiting[key] = frame
         self.due_us = self._free_us

@@ -187,7 +187,8 @@ class Silent(TpdoMode):
 class SynchronousAcyclic(TpdoMode):
     """Transmission type 0: the TPDO is sent with a SYNC, but only after an event.
 
-    The TPDO is also sent with the first SYNC after the start.
+    The TPDO is also sent with the first SYNC after it has become active. A TPDO becomes active when
+    the slave enters Operational or when one of its parameters, except the event timer, is changed.
     """
 
     synchronous: ClassVar[bool] = True
@@ -250,7 +251,8 @@ class SynchronousCyclic(TpdoMode):
 class RtrSynchronous(TpdoMode):
     """Transmission type 252: a remote frame is answered with the data sampled at the latest SYNC.
 
-    Before the first SYNC, the answer contains the data that were sampled at the start of the PDO.
+    The data are also sampled once when the TPDO becomes active. Before the first SYNC, an answer
+    contains these data.
     """
 
     synchronous: ClassVar[bool] = True
@@ -292,7 +294,8 @@ class EventDriven(TpdoMode):
     def run(self, now_us: int) -> None:
         """Send the TPDO if the inhibit time is over; otherwise wait for its end.
 
-        If only the event timer was changed, it is restarted.
+        If this call is due only because the event timer was changed, the event timer is restarted
+        and the TPDO is not sent.
         """
         if self._retimed and not self._marked:
             self._time_anew(now_us)

@@ -18,8 +18,8 @@ class CanBridge:
     """Connects one end of an emulated bus with a real bus that python-can opens.
 
     The nodes of the rig communicate on their own emulated wire. Each of their frames is sent once
-    to the real bus. Frames from the real bus are sent on the emulated wire as if they came from an
-    additional node, so they need the usual time there.
+    to the real bus. Frames from the real bus are sent on the emulated wire as if an additional node
+    sent them. So each of these frames also occupies the emulated wire for the length of the frame.
 
     Args:
         end: an end of the wire without a station.
@@ -39,8 +39,9 @@ class CanBridge:
     def take_in(self, now_us: int, /) -> None:
         """Send on the emulated bus the frames that the real bus has received since the last poll.
 
-        It is not known when a frame was sent since the last poll. The frames are treated as if they
-        had been sent right after the last poll. Therefore polling does not delay a host by a tick.
+        The exact time at which such a frame arrived is unknown. It lies between the last poll and
+        now. Each frame is treated as if it had arrived right after the last poll. With a later
+        time, a host outside would get each answer up to a tick later.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)

@@ -90,7 +90,11 @@ class CanHost:
             self._end.send(self._rig.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
-        """Return whether this host sent a received frame. Call it only once for each frame.
+        """Return whether this host itself sent a frame that it has received.
+
+        Only one frame can end at a time, so the end time identifies the frame. The host remembers
+        the end times of its own frames, and this method removes the given time. Therefore call the
+        method only once for each frame.
 
         Args:
             at_us: time at which the frame ended.
@@ -137,15 +141,16 @@ class CanHost:
 
         Args:
             timeout_us: longest wait; None for no limit.
-            more: whether this call continues an earlier wait with a timeout. `HostLimit` then
-                counts both calls as one wait.
+            more: whether this call continues an earlier wait with a timeout. Both calls then count
+                as one wait for the limit on the waits of hosts (`host_limit` of the rig).
 
         Returns:
             Time and frame, or None after the timeout.
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: a second thread uses the link, or a polling loop would never end.
+            LinkError: a second thread uses the link, or the host polls in a loop that would never
+                end, because the time does not advance.
             LinkTimeout: there is no timeout, and no event is left that could end the wait.
         """
         if self._closed or self._thread.ident != get_ident() or self._thread.refused:

@@ -328,8 +328,9 @@ def read_bus(
 
     Args:
         path: path of the bus.yml.
-        urdf: URDF of the robot with the joints, or None for the robot that `options: tickrig:`
-            names.
+        urdf: path of the URDF file that describes the joints of the robot. With None, the path is
+            taken from the key `urdf` in the mapping `tickrig:` of the section `options:` in the
+            bus.yml.
         cache: cache of EDS files and slaves.
         profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
 

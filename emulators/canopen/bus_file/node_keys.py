@@ -50,7 +50,8 @@ class NodeKeys:
         joint: arguments of `JointDrive` by name.
         modes: numbers of the node's modes of operation, or None to use the modes in its files.
         profile: name of `choices.PROFILES`, or None for `auto`.
-        configured: whether the node starts with the values that its master writes to it.
+        configured: whether the objects of the node have, from the start, the values that the master
+            would write to them at boot-up.
         start: initial inputs by name.
         places: positions of the keys and inputs in the file.
     """
@@ -224,7 +225,8 @@ def read_keys(
     The settings of the node have priority over those of all nodes.
 
     Args:
-        layers: the mapping of the node, then the mappings of all nodes.
+        layers: two mappings: the mapping `tickrig:` of the node, and then the mapping `tickrig:` of
+            the section `options:`, which applies to all nodes.
         where: name of the node, for error messages.
         mistakes: list to which errors are added.
     """

@@ -294,17 +294,20 @@ def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
 def read_value_beside(
     file: EdsFile, index: int, sub: int, kind: DataType
 ) -> tuple[bytes | None, bool]:
-    """Return the value that a DCF gives to an entry of a compact array, which has no section.
+    """Return the value that a DCF gives to an entry of a compact array.
+
+    A compact array has one section for all its entries. The DCF gives the values of the entries in
+    another section, `[INDEXValue]`.
 
     Args:
         file: the DCF, which collects errors.
-        index: index of the object. The value is in the section `[INDEXValue]`.
+        index: index of the object.
         sub: sub-index of the entry.
         kind: data type of the value.
 
     Returns:
-        The bytes of the value, or None if the DCF has no value. The second part of the result is
-        true if the node-ID must be added to the value.
+        A pair. Its first item is the value as bytes, or None if the DCF has no value for the entry.
+        Its second item is true if the node-ID must be added to the value.
     """
     place = f"{index:04X}Value"
     said = _text(file, place, str(sub), kind)

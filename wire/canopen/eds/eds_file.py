@@ -355,9 +355,10 @@ def encoding_of(data: bytes) -> str:
     r"""Detect the encoding of a text file, and return its name in Python.
 
     The encoding is UTF-16 if the file has the byte order mark or if every other byte at the start
-    is zero. It is UTF-8 if the file is valid UTF-8. Otherwise it is a single-byte encoding: CP850
-    if more of the bytes within words are letters of CP850 than of Windows-1252, or else
-    Windows-1252.
+    is zero. It is UTF-8 if the file is valid UTF-8. Otherwise it is one of the single-byte
+    encodings CP850 and Windows-1252. To choose one, the function looks at the bytes above 7Fh
+    inside words. It counts the bytes that are letters only in CP850, and the bytes that are letters
+    in Windows-1252. If the first count is larger, the encoding is CP850, or else Windows-1252.
 
     Args:
         data: content of the file.

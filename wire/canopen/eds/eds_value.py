@@ -56,8 +56,10 @@ class EdsLine(NamedTuple):
         section: section of the line in CiA 306 spelling, or empty before the first section.
         title: title, as written, if the line starts a section, or else empty.
         key: keyword of the line, or empty in other lines.
-        value: value of a keyword. `#` and `//` are kept, because a text may contain them.
-        content: the line without a comment.
+        value: value of the keyword, or empty in other lines. If the value contains `#` or `//`,
+            these characters and the rest of the line are kept, because they may be part of a text.
+        content: the line without a comment that begins with `;`, or with `#` at the start of the
+            line.
     """
 
     number: int
@@ -293,9 +295,10 @@ def is_plain_number(text: str) -> bool:
 def plain_numbers(text: str) -> str:
     """Convert a number to the notation of CiA 306.
 
-    The function removes C suffixes, blanks and underscores within numbers, trailing comments,
-    leading zeros that do not form an octal number, a plus sign, and decimals that are 0. Assembler
-    notation of hexadecimal numbers becomes 0x. Node-IDs are unchanged.
+    The function removes these parts: a suffix as in C (`0x80u`), blanks and underscores within the
+    number, a comment after it, leading zeros if the number cannot be octal (`0009`), a plus sign,
+    and decimals that are 0 (`5.0`). A hexadecimal number in the notation of assemblers (`1Ah`)
+    becomes `0x1A`. The term `$NODEID` of a sum is not changed.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
@@ -323,8 +326,9 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
     Args:
         kind: data type of the limited value.
         text: text, which is not empty.
-        upper: whether the limit is HighLimit. A limit that lies outside the range of the data type
-            has no effect and is kept.
+        upper: whether the limit is HighLimit, or else LowLimit. A HighLimit above the range of the
+            data type, or a LowLimit below this range, excludes no value. Such a limit is returned
+            unchanged.
 
     Returns:
         The limit. The result is None if values of this type have no limits, or if the limit depends
@@ -355,7 +359,8 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
 def format_limit(kind: DataType, limit: int | float) -> str:
     """Return a limit as it is written to an EDS file.
 
-    A float is written as its bytes if they represent it exactly.
+    A limit of a float type is written as the hexadecimal bytes of the float, if these bytes
+    represent the limit exactly. Other limits are written as decimal numbers.
     """
     with suppress(ValueError):
         if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:
@@ -366,8 +371,9 @@ def format_limit(kind: DataType, limit: int | float) -> str:
 def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
     """Return a value as it is written to an EDS file.
 
-    A float is written as its bytes, as Lely's tools require, but 0 is always written as 0. Some
-    values cannot be expressed exactly. The caller detects this by reading the text again.
+    A float is written as its hexadecimal bytes, as Lely's tools require. Only a float whose bytes
+    are all zero is written as `0`. Some values have no exact text in an EDS file. To detect such a
+    value, the caller has to parse the returned text and compare the result with the value.
 
     Args:
         kind: data type of the value.

@@ -100,9 +100,11 @@ class Phase(Enum):
 class HomingSearch(Part):
     """The search for home with one homing method, advanced by one control step at a time.
 
-    The axis always crosses the edge of the switch slowly at the end. If it meets the switch during
-    the search, or cannot brake within a narrow switch, it moves back first. Therefore home is the
-    same position from every start. An edge counts only while the axis moves as demanded.
+    At the end of the search, the axis crosses the edge of the switch slowly and in the direction
+    that the method prescribes. Therefore home is the same position from every start. If the axis
+    crosses this edge at a higher speed, it moves back and crosses the edge again. It also moves
+    back if it has met the switch from the wrong side. An edge counts only while the axis moves as
+    demanded.
 
     Attributes:
         method: the homing method.

@@ -122,8 +122,9 @@ class Mode(Part):
         A drive calls this method to compute several ticks at once.
 
         Returns:
-            The line, with the largest velocity at which it may continue, or None if each step needs
-            a separate call of `step`.
+            The demanded positions on a straight line. The attribute `most` of the line is the
+            largest velocity for which the line is valid. The result is None if each step needs a
+            separate call of `step`.
         """
         return None
 
