@@ -147,7 +147,7 @@ class Automaton(Part):
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
     def run(self) -> bool:
-        """Run one control period in which the state machine moves the motor, as in a quick stop.
+        """Run one control period of the state machine, for example a period of a quick stop.
 
         The drive calls this method instead of its mode of operation while the mode is not active.
 
