@@ -103,10 +103,12 @@ class ScenarioParser:
 
     Args:
         device: device whose inputs and outputs the scenario may name.
-        operator: operator of the device, which determines the valid actions.
-        encoders: further verbs that send a line, in addition to `send`.
-        senders: verbs that send data on a wire without text lines. If they are given, they replace
-            `send` and the encoders.
+        operator: operator of the device, which checks the names and values in actions such as
+            `set`, `press` and `fault`.
+        encoders: functions by the names of additional verbs. Such a verb sends a line like the verb
+            `send`; its function makes the bytes of the line from the text in the scenario.
+        senders: functions by the names of verbs, for a wire without text lines. If they are given,
+            the scenario has these verbs instead of `send`, `raw` and the verbs of `encoders`.
     """
 
     def __init__(

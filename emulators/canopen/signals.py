@@ -77,12 +77,12 @@ _DeferredCall = Callable[[Callable[[], None]], None]
 
 
 class ObjectSignal:
-    """An object of the dictionary as a signal, which is read and set inside the device.
+    """A signal that reads and sets an object of the object dictionary inside the device.
 
-    The bus is not used. Access rights are ignored, except that a constant cannot be changed. The
-    service to which an object belongs checks a new value and uses it like a value from the bus. For
-    example, a new heartbeat time takes effect. The value changes at the start of the node's next
-    tick.
+    The bus is not used. Access rights are ignored, except that a constant cannot be changed. If a
+    service of the node owns the object, this service checks a new value, and uses the value as if
+    it had come from the bus. For example, the heartbeat service uses a new heartbeat time. The
+    value changes at the start of the node's next tick.
 
     Args:
         name: name of the object, as returned by `object_name`.
@@ -302,11 +302,13 @@ OnSet = Callable[[str, Setting], None]
 class NotedSignal:
     """Wrapper of a signal that calls a function after each change of the wrapped signal.
 
-    See `NodeSignal`.
+    A node that has a callback `on_set` wraps its signals in this class, for example to record each
+    change in a trace. `NodeSignal` describes the methods.
 
     Args:
         signal: the wrapped signal.
-        note: function that is called after each change.
+        note: function that is called after each change, with the name and the new value of the
+            signal.
     """
 
     def __init__(self, signal: NodeSignal, note: OnSet) -> None:

@@ -149,13 +149,14 @@ def verb(
 ) -> Callable[[Callable[..., Object]], click.Command]:
     """Return a decorator that makes a command of `tickrig ctl`.
 
-    The command sends a request to an emulator, and prints the answer. The decorated function
-    returns the fields of the request.
+    The decorated function gets the arguments of the command line, and returns the fields of a
+    request. The command sends this request to an emulator, and prints the answer of the emulator.
 
     Args:
         show: function that formats the answer as lines of text.
         whom: name of the program that answers, for messages.
-        settings: settings of the command.
+        settings: keyword arguments for the decorator `ctl.command` of click, such as
+            `context_settings`.
     """
 
     def decorate(fields: Callable[..., Object]) -> click.Command:

@@ -155,7 +155,8 @@ class ConfiguredDevice:
     """A device that was made from a command line or a rig file, with its settings.
 
     Attributes:
-        type: device type, after changes by its options.
+        type: type of the device. It may be a changed copy of the listed type. For example, the
+            option `--node` of an RTC-Lite node changes the title and the verbs of the type.
         device: the device.
         config: all settings of the device, which a trace records.
     """
@@ -236,8 +237,9 @@ def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
     """Raise ValueError if a replay of a trace would run a Python file without permission.
 
     Args:
-        named: settings in the trace, of which one may name a Python file.
-        run_code: whether the user has allowed it with `--run-code`.
+        named: values from the trace, such as the values of settings. A text `FILE.py:Class` names
+            Python code.
+        run_code: whether the user has allowed this code with `--run-code`.
 
     Raises:
         ValueError: the trace names a `FILE.py:Class`, and `run_code` does not allow it.
@@ -253,7 +255,8 @@ def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = 
     Args:
         config: the configuration, as in a trace.
         defaults: all settings of the device with their defaults.
-        owner: start of the message, such as `an RRC has no setting`.
+        owner: beginning of the error message for an unknown setting, such as `an RRC has no
+            setting`. In the message the name of the setting follows.
         typed: whether a value must have the type of its default.
 
     Raises:

@@ -108,8 +108,9 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
 
     Args:
         wire_faults: names of wire faults, separated by commas.
-        inputs: function that returns the physical inputs of the device for shell completion, or the
-            position of a table of the inputs as `MODULE:NAME`.
+        inputs: physical inputs of the device, for shell completion: a function that returns the
+            inputs, or a text `MODULE:NAME` with the module and the variable that contain the
+            inputs.
     """
 
     def device_faults(context: click.Context) -> list[str]:
@@ -160,12 +161,14 @@ def serial_command(
 ) -> Callable[[Callable[[], None]], click.Command]:
     """Return a decorator that makes the click command of an emulated device on a serial line.
 
-    The docstring of the decorated function becomes the help text. Its body is empty.
+    The decorated function is never called, so it needs only a docstring. This docstring becomes the
+    help text of the command.
 
     Args:
         name: name of a device type in `device_type.DEVICES`.
         fields: fields of the device, which become options.
-        inputs: position of the table of physical inputs, as `MODULE:NAME`.
+        inputs: text `MODULE:NAME` with the module and the variable that contain the physical
+            inputs.
         wire_faults: names of wire faults, separated by commas.
         panel: whether the device has an operator panel.
     """

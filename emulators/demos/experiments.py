@@ -231,14 +231,16 @@ class ConvoyRun:
     """A run of a demonstration in which robots follow one another, with their recorded motions.
 
     Args:
-        experiment: the experiment, with its robots and acts.
+        experiment: description of the experiment: its robots, and the changes that are planned for
+            the run (`Experiment.acts`).
         echo: function that is called with a line of the table every 2 s.
         clock: clock of a run in real time, or None for a run in virtual time.
 
     Attributes:
         convoy: the robots and their components.
         tracks: tracks of the robots, in the order of their numbers.
-        marks: changes of connectors.
+        marks: changes during the run up to now, mostly of connectors. The picture marks each change
+            with a number.
     """
 
     def __init__(self, experiment: Experiment, echo: _Echo, clock: RealClock | None = None) -> None:

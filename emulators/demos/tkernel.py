@@ -33,7 +33,7 @@ from tickrig.wire.ucode import BAUD, MAX_LEVEL
 class Estimate:
     """The position of a robot on a plane, estimated from its odometry and from infra-red markers.
 
-    The method of estimation is a choice of the demonstration.
+    Only the demonstration `tickrig demo tkernel` uses this method of estimation.
 
     Attributes:
         range_m: range of the reader that receives the markers, in metres.

@@ -31,8 +31,9 @@ class NumberRule:
 
     Attributes:
         pattern: shell pattern of the whole line or frame, such as `EV:batt*` or `181#*`.
-        least: largest allowed difference, in per cent of the recorded number if `share` is true.
-        share: whether `least` is a percentage.
+        least: allowed difference between the recorded and the emulated number. If `share` is true,
+            the difference is given in per cent of the recorded number.
+        share: whether `least` is given in per cent.
         place: first position and end of the number in the line, or None for all decimal numbers of
             the line. Positions count the characters (hex digits) of a text line, or the data bytes
             of a frame. A number in a frame has its lowest byte first.
@@ -110,8 +111,8 @@ class Tolerance:
     """Allowed deviations of an emulated run from a recorded run.
 
     Attributes:
-        time_us: allowed deviation of a time in microseconds, to which the drift of two clocks is
-            added.
+        time_us: allowed deviation of a time in microseconds, without drift. The method `allowed_us`
+            adds the largest drift between two clocks, which grows with the duration of the run.
         numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
         kinds: patterns of lines that are independent of all other lines. The emulator may send such
@@ -202,9 +203,9 @@ def compare(
 ) -> list[Pair]:
     """Compare the lines that a device has sent in a recording with those of an emulator.
 
-    The order of lines is compared only within a kind (`Tolerance.kind`). A line of the emulator is
-    ignored if it has no counterpart and is within the time tolerance of the start or the end of the
-    recording.
+    The order of lines is compared only within a kind (`Tolerance.kind`). A line of the emulator may
+    have no counterpart in the recording. Such a line is ignored if it is near the start or the end
+    of the recording, that is, within the time tolerance.
 
     Args:
         recorded: recorded lines in order of time.

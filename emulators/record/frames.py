@@ -163,8 +163,9 @@ class FrameSplitter(Copyable):
 
         Args:
             now_us: present time in microseconds.
-            data: bytes received since the last call. When `due_us` has passed, the method must be
-                called without bytes, so that a silence ends a frame.
+            data: bytes received since the last call, or empty if no byte has arrived. A silence can
+                end a frame: the attribute `due_us` is the time at which the silence is long enough.
+                At this time the caller must call the method, even without bytes.
 
         Returns:
             The completed frames, and pieces of data that are not complete frames.

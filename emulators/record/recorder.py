@@ -159,9 +159,9 @@ class DeviceBefore(Generic[W]):
 class TracedDevice(DeviceBefore[W]):
     """Wrapper that records a device in a trace; the wrapper has the interface of the device.
 
-    It records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
-    controller. If the device has a callback `on_set`, which nodes call when an object is set, these
-    calls are recorded, too.
+    The wrapper records the device's traffic, changes of the device's `inputs`, resets, and the
+    states that the CAN controller reports. If the device has a callback `on_set`, as a CANopen node
+    has, the wrapper uses the callback to record each signal that is set.
 
     Args:
         device: the device to record.
@@ -197,7 +197,11 @@ class TracedDevice(DeviceBefore[W]):
 
     @property
     def due_us(self) -> int:
-        """Time at which the device must be called next. It is 0 if a change is not recorded yet."""
+        """Time at which the device must be called next, or 0 for the next tick.
+
+        The time is 0 if the device was changed, for example by a reset, because the next call of
+        `tick` records the change.
+        """
         if self._done:
             return 0  # a tick that is not due changes nothing, and a replay resets where it was
         return self._device.due_us  # type: ignore[no-any-return]  # a Device, asked in each tick
@@ -253,7 +257,8 @@ class Tick(NamedTuple):
         done: actions before the tick, such as `stick=5`.
         received: bytes or frames that the device received.
         sent: bytes or frames that the device sent.
-        mark: mark that the actions have in the trace. The mark `~` stands for a wire.
+        mark: mark of the actions in the trace. If the mark is `~`, `name` is the name of a wire,
+            otherwise the name of a device.
     """
 
     at_us: int

@@ -406,10 +406,10 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, _Traffic, int]]:
-    """Yield the traffic of one direction, joined by tick.
+    """Yield the traffic of one direction as a tuple for each tick with traffic.
 
-    Each item has the time of a tick and all bytes or frames of this tick. The last part of an item
-    is the line number in the trace at which these data begin.
+    The parts of the tuple are the time of the tick, all bytes or frames of the tick, and the number
+    of the line in the trace at which these data begin.
     """
     together: list[Any] = []
     at_us = line = -1

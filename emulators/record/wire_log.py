@@ -123,8 +123,9 @@ class WireLog:
         """Return the incomplete line or frame of each direction, as an entry with the number 0.
 
         Args:
-            by_gap: whether to return only frames that end by a silence. Such a frame may already be
-                complete. If false, only the other lines and frames are returned.
+            by_gap: choice of the lines and frames: true for the frames that end by a silence, false
+                for all other lines and frames. A frame that ends by a silence may already be
+                complete.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

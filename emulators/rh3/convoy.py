@@ -149,8 +149,8 @@ class _Robot:
 class Convoy:
     """Several emulated robots that drive one behind the other, with poses in one map frame.
 
-    The first robot keeps its planner. Each other robot follows the commands that arrive at its
-    ports.
+    Only the first robot has a connected planner, the component `PathFollower0`, which drives it
+    along paths. Each other robot follows the commands that arrive at its ports.
 
     Args:
         carts: initial poses of the robots on two wheels.

@@ -129,9 +129,11 @@ class FaultForm(Immutable):
 
     Attributes:
         text: description of the fault as readable text.
-        rated: whether the fault accepts the arguments `rate=` and `count=`.
-        arguments: arguments of the fault itself. Values of `bare` arguments may be written without
-            names in this order.
+        rated: whether the fault also accepts the arguments `rate=` (a probability) and `count=` (a
+            largest number of times).
+        arguments: arguments of the fault itself. If the attribute `bare` of an argument is true,
+            the value of this argument may be written without a name. Values without names stand in
+            the order of the arguments.
         usual_rate: default of `rate`.
     """
 

@@ -46,7 +46,10 @@ def enable(wanted: bool) -> bool:
 
 
 def bits(frame: object) -> int | None:
-    """Return the length of a CAN frame in bits, or None if Python must count the bits."""
+    """Return the length of a CAN frame in bits, or None if the compiled kernel cannot read the frame.
+
+    If the result is None, the caller counts the bits with Python code.
+    """
     counted: int | None = _KERNEL.frame_bits(frame)
     return counted
 
@@ -103,9 +106,11 @@ if TYPE_CHECKING or _KERNEL is None:
 
         Args:
             rig: the rig.
-            parts: timetable, bus, event queue, horizon, watchers, hosts and stations of the rig.
+            parts: the parts of the rig that the kernel uses: timetable, bus, event queue,
+                `Horizon`, watchers, hosts and stations (devices at their ports).
             until_us: end of the run, in microseconds.
-            unseen_us: time until which no code reads a device, in microseconds.
+            unseen_us: time until which probably no code reads a device, in microseconds. Up to this
+                time a device may compute several ticks in advance.
             host: end of a wire at which a host waits for traffic, or None if no host waits.
 
         Returns:

@@ -33,17 +33,18 @@ class Port(Protocol[W]):
 class LineUart(Part):
     """The UART setting of the device on a serial line, with listeners to its changes.
 
+    If the line is copied, for example with its bench, the copy has the same listeners.
+
     Args:
         setting: the initial setting.
 
     Attributes:
         setting: the setting after the latest change.
         since_us: time from which the present setting applies, in microseconds.
-        listeners: functions that are called with `since_us` and the new setting. A copy of the line
-            has the same functions.
+        listeners: functions that are called with `since_us` and the new setting.
         error_listeners: functions that are called when a fault has spoiled characters. They get the
             direction, the error that a UART detects (`framing`, `parity`, `breaks`), and the number
-            of characters. A copy of the line has the same functions.
+            of characters.
     """
 
     def __init__(self, setting: UartSetting) -> None:
@@ -81,7 +82,8 @@ class ByteEnd(Port[bytes], Protocol):
         """Return the time at which `count` bytes will have arrived at this end.
 
         If this time is not known yet, the result is the time at which to call this method again, or
-        `NEVER`.
+        `NEVER`. The result does not show which of the two times it is. Therefore the caller counts
+        the bytes at the returned time, and calls this method again if bytes are missing.
         """
         ...
 

@@ -163,9 +163,10 @@ class _Wires(Part):
             self._wires[place].advance(now_us)
 
     def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
-        """Advance all wires to a time, but stop before a tick for which a device was woken.
+        """Advance all wires to a time, but stop early if arriving traffic wakes a device.
 
-        Arriving traffic wakes the device that receives it.
+        Traffic wakes the device that receives it, so the device has work in its next tick. The
+        wires stop before this tick.
 
         Args:
             until_us: latest time to which the wires advance, in microseconds.
@@ -432,9 +433,10 @@ class Rig(Copyable):
         Args:
             t_us: end of the run, in microseconds since the start of the rig.
             host: host whose traffic ends the run early, or None to run to the end.
-            unseen_us: time after `t_us` in which the caller will probably not read devices or set
-                inputs between ticks. This only makes the run faster: the result is right even if
-                the caller does read devices or set inputs.
+            unseen_us: duration in microseconds, which begins at `t_us`. The caller will probably
+                not read devices or set inputs between ticks in this time. The duration only makes
+                the run faster: if the caller does read devices or set inputs, the result is right,
+                too.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):

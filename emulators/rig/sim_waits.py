@@ -91,10 +91,11 @@ class Looks(Copyable):
 class HostLimit(Copyable):
     """Base class for a limit on the waits of hosts. Only subclasses set a limit.
 
-    Before a host advances the time, it calls `count` if the time `due_us` has passed.
+    A host waits by advancing the time of the rig. If the present time is `due_us` or later when a
+    wait begins, the port of the host calls `count`, so that the wait is counted.
 
     Attributes:
-        due_us: time from which the next wait of a host is counted, in microseconds.
+        due_us: time in microseconds. A wait of a host that begins before this time is not counted.
     """
 
     due_us: int = NEVER

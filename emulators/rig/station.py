@@ -19,7 +19,8 @@ from tickrig.wire.uart import UartSetting
 class WirePort(Protocol[W]):
     """Protocol of a `Port` that reports the arrival of traffic, so that the rig need not poll it.
 
-    `WirePort` is not derived from `Port`, because a compiled base class has additional names.
+    `WirePort` is not derived from `Port`: a compiled base class has additional names, which would
+    become members of the protocol.
     """
 
     @property
@@ -108,9 +109,9 @@ class Timetable(TimetableFields):
 
     Attributes:
         first_us: time of the first tick with work, or `NEVER` if there is none.
-        open_us: earliest time at which a tick can be entered.
-        in_step: flag that is 1 while a step of the rig is running, otherwise 0. It is stored here
-            for the compiled kernel, which saves 2 % of the time of an SDO transfer.
+        open_us: earliest time for which `enter` can plan a tick, in microseconds.
+        in_step: flag that is 1 while a step of the rig is running, otherwise 0. The flag is stored
+            in this class for the compiled kernel; an SDO transfer then takes 2 % less time.
     """
 
     __slots__ = ()

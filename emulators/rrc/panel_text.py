@@ -53,8 +53,9 @@ class PanelView:
     Attributes:
         values: values of inputs and outputs by name.
         status: status of the run by name.
-        lines: latest lines on the wire except SA, each as `(time, mark, text)`.
-        report: latest SA line.
+        lines: latest lines on the wire, each as `(time, mark, text)`. Lines with the status `SA`
+            are omitted.
+        report: latest line with the status `SA`.
     """
 
     values: Mapping[str, _Value] = field(default_factory=dict)
@@ -156,7 +157,10 @@ _STICK_HINTS: Final = {
 
 
 def stick_hint(view: PanelView) -> str:
-    """Return a hint of at most 21 columns for the panel: whether the stick drives, or why not."""
+    """Return a hint for the panel: whether the stick drives the wheelchair, or why not.
+
+    The hint has at most 21 columns.
+    """
     state = str(view.values.get("state", ""))
     if state == "Standby" and view.number("stick_drives"):
         return "drives"

@@ -100,9 +100,9 @@ class Bridge:
     def take_in(self, now_us: int) -> None:
         """Send on the emulated line the data that outside hosts have written since the last poll.
 
-        It is not known when a host has written its data since the last poll. The data are sent as
-        if they had been written right after the last poll. Therefore polling does not delay them by
-        a tick.
+        The exact time at which a host has written data is not known: it is after the last poll and
+        before this poll. The data are sent as if the host had written them right after the last
+        poll. If they were sent as of this poll, each poll would delay data by up to a tick.
         """
         if self._pending:
             self._attend(now_us)
@@ -219,8 +219,9 @@ class HostEnd:
 class Tap(Copyable, Generic[W]):
     """Wrapper of a port that reports all its traffic to listeners.
 
-    The port may be the device's end of a wire, or the port of the host. Polled data go to the
-    device, and sent data come from the device. A copy has no listeners.
+    The port may be the device's end of a wire, or the port of the host. In both cases `poll`
+    returns the data that go to the device, and `send` forwards the data that come from the device.
+    A copy of the wrapper has no listeners.
 
     Args:
         port: the wrapped port.

@@ -101,13 +101,13 @@ class ServedCart:
 
 
 class CartControl(SystemControl):
-    """Answers requests to a running cart: goals, paths, and the requests of any RT system.
+    """Answers requests to a running cart: for goals and paths, and those of `SystemControl`.
 
     Goals and paths are commands of the component PositionInput.
 
     Args:
-        connection: connection to the base, with the RT components. It must not be advanced while a
-            request is answered.
+        connection: connection to the base, with the RT components. While a request is answered, the
+            time of the connection must not advance.
         cart: object that advances the cart.
     """
 
@@ -161,7 +161,9 @@ def _pose(value: object, least: int) -> Pose:
 
 
 def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | None = None) -> None:
-    """Run a cart until Ctrl-C or until a peer ends the run, then deactivate its components.
+    """Run a cart until Ctrl-C or until another program ends the run.
+
+    At the end the components of the cart are deactivated.
 
     Lines typed on standard input are commands of the component PositionInput. When standard input
     ends and no other program can reach the cart, the run ends after the last command.
