@@ -46,7 +46,7 @@ def enable(wanted: bool) -> bool:
 
 
 def bits(frame: object) -> int | None:
-    """Return the length of a CAN frame in bits, or None if the compiled kernel cannot read the frame.
+    """Return the length of a CAN frame in bits, or None if the kernel cannot read the frame.
 
     If the result is None, the caller counts the bits with Python code.
     """

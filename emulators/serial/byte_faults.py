@@ -222,7 +222,9 @@ class _Late(ByteFault, HoldingFault[bytes]):
         self._queue, self._free_us = other._queue, other._free_us
 
     def sent(self, until_us: int) -> None:
-        """Delay the next pause of the fault until the line has sent the latest bytes.
+        """Note when the line will have sent the latest bytes: the next pause begins then.
+
+        The fault makes pauses between bytes.
 
         Args:
             until_us: time at which the last byte has been sent, in microseconds.

@@ -71,8 +71,9 @@ class Emulator(RunningEmulator):
     Args:
         name: name of the device.
         device: the device.
-        outside: port at which the host is connected, such as a pty. Without it the caller is the
-            host (`send`, `log`).
+        outside: port at which the host is connected, such as a pty, or None if the caller is the
+            host. Such a caller sends data with the method `send`, and finds the answers of the
+            device in `log`.
         clock: clock of the rig, or None to use a `VirtualClock`.
         seed: seed of random wire faults.
         trace: file that records the run, or None to record nothing.
@@ -81,7 +82,8 @@ class Emulator(RunningEmulator):
 
     Attributes:
         line: the serial line.
-        host_end: end of the line for the caller, also for a `SimLink`. Its traffic is logged.
+        host_end: end of the line at which the caller, or a `SimLink`, acts as the host. The traffic
+            at this end is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword

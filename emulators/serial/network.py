@@ -223,7 +223,10 @@ class HostConnection:
         return data
 
     def hold(self, now_us: int) -> None:
-        """Negotiate with a host that waits because another host uses the line, and keep its data.
+        """Keep data of a host that waits because another host uses the line.
+
+        A host of RFC 2217 gives up without negotiation. Therefore this method also negotiates with
+        such a waiting host.
 
         Only the first part of the waiting host's data is read and kept.
         """
@@ -339,7 +342,7 @@ class _QuietAdapter(SerialBase):
     cts = dsr = ri = cd = False
 
     def reset_input_buffer(self) -> None:
-        """Do nothing. The host itself drops received data if it asks to purge the data."""
+        """Do nothing: a host that requests a purge drops the received data on its own side."""
 
     def reset_output_buffer(self) -> None:
         """Do nothing: earlier data are already on the line."""
@@ -517,7 +520,9 @@ class NetworkPort(NonCopyable):
         """Set the port like the device, and report each host that requests another setting.
 
         Args:
-            baud: bit rate of the device in bit/s, with 8N1. A rate above 4 Mbit/s is not checked.
+            baud: bit rate of the device in bit/s, with 8N1. Rates above 4 Mbit/s, the highest rate
+                of adapters, are not checked: such a device is on USB, and its host may use any
+                setting.
             notify: function that is called with each setting that differs, such as `9600 8N1`.
         """
         self._uart = UartSetting(baud)

@@ -259,8 +259,9 @@ class PtyPort(NonCopyable):
         The bytes are not changed, because a pty transmits without a bit rate.
 
         Args:
-            setting: new setting of the device. A pty shows 8 data bits, and even parity as no
-                parity.
+            setting: new setting of the device. A host's setting of a pty always reads as 8 data
+                bits, and even parity reads as no parity. The new setting is compared in the same
+                form.
         """
         if self._setting is not None:
             parity = "O" if setting.parity == "O" else "N"

@@ -299,8 +299,9 @@ def add_position_detection(
 ) -> None:
     """Add to a board the RT components that detect a position by ucodes, and activate them.
 
-    These are three components: reader, settlement and interpretation. They are connected with each
-    other before they are activated.
+    These are three components: `InfraredRaysReader` receives ucodes, `UcodeSettlement` asks for the
+    address of the information about a ucode, and `ContentsInterpretation` fetches this information.
+    They are connected with each other before they are activated.
 
     Args:
         manager: the manager of the board's RT components.

@@ -101,7 +101,9 @@ class ServedCart:
 
 
 class CartControl(SystemControl):
-    """Answers requests to a running cart: for goals and paths, and those of `SystemControl`.
+    """Answers requests to a running cart.
+
+    The requests are goals and paths, and all requests that `SystemControl` answers.
 
     Goals and paths are commands of the component PositionInput.
 

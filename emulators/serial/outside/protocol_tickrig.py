@@ -12,8 +12,8 @@ class Serial(SimSerial):
 
     The name in the URL is looked up when the port is opened. As with any pyserial port, the default
     setting is 9600 8N1, whatever the device uses. If the settings of port and device differ, the
-    option `?mismatch=errors` or `?mismatch=refuse` of the URL selects what happens. A URL without
-    this option uses the choice of the code that offers the name.
+    option `?mismatch=errors` or `?mismatch=refuse` of the URL selects what happens. For a URL
+    without this option, the `mismatch` applies that was chosen when the name was offered to hosts.
 
     Args:
         port: URL, which is opened at once, or None to open the port later.

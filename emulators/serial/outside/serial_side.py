@@ -100,15 +100,16 @@ class ModemLines(Copyable):
 class HostReceiver(Copyable):
     """Receiving UART of a host, which samples the bytes of an emulated line with its own setting.
 
-    If the settings of host and device differ, a character of the host may end within a byte of the
-    device. Such a character becomes available when that byte has passed. A character with an error
-    is delivered like any other character and counted, as Linux and Windows do for pyserial.
+    If the settings of host and device differ, the host receives characters that differ from the
+    bytes of the device. A received character may end while the device is still sending a byte. The
+    host can read such a character when this byte has ended. A character with an error is delivered
+    like any other character and counted, as Linux and Windows do for pyserial.
 
     Args:
         end: the host's end of the line.
         device: setting of the device.
-        garbled: function that is called, with the time, when bytes are sampled with a different
-            setting.
+        garbled: function that is called, with the time, when bytes arrive while the settings of
+            host and device differ.
 
     Attributes:
         errors: counters of characters with errors.
@@ -470,7 +471,8 @@ class HostWaits(Copyable):
     def deadline_us(self, timeout_s: float | None) -> int:
         """Return the end of a timeout that starts now, as a time in microseconds.
 
-        Without a timeout, the result is the time at which `give_up` ends an endless wait.
+        Without a timeout, the result is one hour from now. If the wait has no result by then,
+        `give_up` raises an exception.
 
         Args:
             timeout_s: timeout in seconds, or None for no timeout.
@@ -478,10 +480,10 @@ class HostWaits(Copyable):
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
     def give_up(self, timeout_s: float | None) -> None:
-        """Raise SerialException if a wait without timeout has ended without result.
+        """Raise SerialException if a wait without timeout has lasted until `deadline_us`.
 
-        Otherwise the host would wait endlessly. After a wait with a timeout this method does
-        nothing.
+        Without this exception, the host would wait forever. After a wait with a timeout this method
+        does nothing.
 
         Args:
             timeout_s: expired timeout in seconds, or None if there was no timeout.

@@ -561,11 +561,13 @@ class Bench(BenchDevice, Closing):
         - `wait` of threading's events and conditions
         - `get` and `put` of queues
 
-        The functions are replaced wherever host code has stored them
-        (docs/reference/bench/hosts.md). In real time nothing changes.
+        Host code may have stored such a function elsewhere, for example as an attribute of a class.
+        The stored function is replaced, too (docs/reference/bench/hosts.md). In real time nothing
+        changes.
 
         Returns:
-            A context manager that returns the clock, with the functions of `time`.
+            A context manager. Its value in a `with` statement is the clock of the bench, which has
+            the functions of the module `time`.
         """
         if isinstance(self._mode, VirtualMode):
             return self._mode.patched_time()

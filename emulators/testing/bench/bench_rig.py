@@ -66,9 +66,10 @@ _ENDS: Final = (b"host", b"device")
 class Journal(WireLog):
     """Log of a bench: the latest lines, frames and actions on all wires, in order of time.
 
-    A line of text is recorded when the device has received or sent the last byte of the line. The
-    bytes of a serial line are those that the host sent or received. If a fault has changed data, a
-    further entry with the mark `~` shows the data as sent and as received.
+    A line of text is recorded when the device has received or sent the last byte of the line. On a
+    serial line, the recorded bytes are those that the host has sent or received. If a fault on the
+    way to or from the device has changed data, a further entry with the mark `~` shows the data as
+    sent and as received.
     """
 
     def __init__(self) -> None:
@@ -95,8 +96,9 @@ class Journal(WireLog):
 
         Args:
             source: name of the line or node.
-            ends: words for the sender and the receiver of traffic to the device, such as host and
-                device.
+            ends: two words for the text of an entry, such as `host` and `device`. The first word
+                names the side that sends traffic to the device, the second word names the side that
+                receives this traffic.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """
@@ -171,8 +173,9 @@ class Journal(WireLog):
         """Return the kept lines in order of time.
 
         On some lines a frame ends by a silence. The last frame of such a line is included, although
-        it may not be complete yet. An action has the time of the next tick of its device. Therefore
-        it may have been added to the journal before frames that end earlier.
+        it may not be complete yet. The order of time can differ from the order in which lines were
+        added: an action is added at once, but has the time of the next tick of its device. A frame
+        that ends before this tick is added later.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
@@ -236,7 +239,11 @@ class BenchOperator(Operator):
         self._assembly, self._wires = assembly, faults.wires
 
     def full_name_of(self, name: str) -> str:
-        """Return the full name of a fault from its name, with or without its device or wire."""
+        """Return the name under which the bench has a fault.
+
+        The given name may begin with a device or wire, as `DEVICE/FAULT`. This beginning is removed
+        if the bench has the fault only without it.
+        """
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
         return bare if owned and name not in self.faults and bare in self.faults else name
@@ -251,7 +258,8 @@ class Parts:
 
     Attributes:
         mounts: wires with their devices.
-        bodies: mechanical bodies that drives move; each body is also a device `body`.
+        bodies: mechanical bodies that drives move. The bench also treats each body as a device,
+            with the name `body`.
         start: initial values of inputs, by device and name.
         signals: values that change with time. The key is the input that the signal drives, as
             `DEVICE/INPUT`, or a name that formulas use.
@@ -505,7 +513,7 @@ _BUS_AND_NODE: Final = (b"bus", b"node")
 class BenchRig(RunningEmulator):
     """The running emulation of a bench: its rig with all devices, their operator and the journal.
 
-    `EmulatorControl` answers requests about it.
+    `EmulatorControl` answers requests about this bench.
 
     Args:
         name: name of the bench.
@@ -515,7 +523,8 @@ class BenchRig(RunningEmulator):
     Attributes:
         state: rig, wires and devices of the bench.
         journal: log of the traffic and the actions.
-        orders: scheduled faults, except those that a control socket has requested.
+        orders: faults that a rig file or a test has requested, with their times and conditions.
+            Faults that a control socket has requested are not in this list.
         ports: ports of hosts in real time, by name of the line.
     """
 

@@ -39,8 +39,9 @@ class LineMount(Copyable):
         line: the line.
         devices: devices by name.
         entries: description of each device for the header of a trace, by name of the device.
-        tap: object that reports the traffic at the first device's end of the line. It reports sent
-            traffic as it is after the faults of the line.
+        tap: object that reports the traffic at the first device's end of the line. The reported
+            bytes are those that the host sends or receives: traffic to the device before a fault
+            has changed it, and traffic from the device after a fault has changed it.
     """
 
     def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:

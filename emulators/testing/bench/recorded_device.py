@@ -38,7 +38,8 @@ def node_entry(
         slave: the slave.
         device: source of the device: EDS or DCF, name of a model, or `FILE.py:Class`. If it is
             empty, the source is the model name of the slave.
-        profile: profile for a file, which is one of `choices.PROFILES`.
+        profile: CiA profile by which a device from an EDS or DCF file is emulated: one of
+            `choices.PROFILES`.
         files: further source files.
 
     Raises:

@@ -57,9 +57,10 @@ class CollectedTest(NamedTuple):
     """A test of a campaign, which is run with many seeds.
 
     Attributes:
-        nodeid: node ID, as in pytest.
+        nodeid: node ID as pytest reports it, relative to pytest's root folder.
         values: values of the test's parameters, as written in the command line.
-        place: node ID relative to the folder of the campaign.
+        place: node ID relative to the folder in which the campaign was started, as in a command
+            line of pytest.
     """
 
     nodeid: str

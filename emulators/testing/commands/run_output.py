@@ -181,7 +181,8 @@ class RunPlots:
     """Curves of signals during a run, for the options `--plot SIGNALS` and `-o FILE`.
 
     Args:
-        words: the diagrams, one word for each diagram.
+        words: texts of the options `--plot`, each for one diagram: `NAME[,NAME...]` for curves over
+            time, or `X:Y` for a diagram of Y over X.
         files: files for the curves, or empty to draw in the terminal.
         inputs: files that the run reads, which must not be overwritten.
 
@@ -420,7 +421,7 @@ class RunPage:
             virtual: whether the run was in virtual time.
             rows: rows of the table of wires: the name of a wire, its address for hosts, its rate,
                 and its devices.
-            paths: diagrams in which one signal is drawn over another.
+            paths: diagrams with one signal on the x axis and another signal on the y axis.
 
         Raises:
             Refused: the page cannot be written.

@@ -163,7 +163,7 @@ _Buses = dict[str, dict[str, CanopenSlave]]
 def bench_source(
     mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
 ) -> ConformSource:
-    """Return the CANopen nodes of a bench in the form in which the conformance tester tests them.
+    """Return the CANopen nodes of a bench as a source of nodes for the conformance tester.
 
     The nodes boot first, which takes time on the bench.
 

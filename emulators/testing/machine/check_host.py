@@ -61,7 +61,9 @@ def check_host(
 
 
 def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | None = None) -> Any:
-    """Return a Hypothesis test that searches for failures of a host, by drawing and running steps.
+    """Return a Hypothesis test that searches for failures of a host.
+
+    The test executes random steps, which Hypothesis chooses, with `runs`.
 
     Raises:
         ModuleNotFoundError: Hypothesis is not installed.

@@ -87,7 +87,8 @@ class HostStep:
     def do(self, bench: Bench) -> None:
         """Wait for the pause of this step, then execute its action on a bench.
 
-        A `call` cannot be executed this way, because it needs a machine.
+        A step with the verb `call` calls a method of a `BenchMachine`. This function cannot execute
+        such a step, because it has only the bench.
 
         Args:
             bench: the bench.
@@ -288,7 +289,9 @@ def _seeded() -> Iterator[None]:
 
 
 class HostRuns:
-    """Runs a `BenchMachine` many times on one bench, which it keeps open as a context manager.
+    """Runs a `BenchMachine` many times on one bench.
+
+    The object is a context manager: the bench is open within the `with` block.
 
     Args:
         kind: class of the machine.

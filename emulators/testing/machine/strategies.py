@@ -84,9 +84,9 @@ def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrat
 
 
 def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
-    """Return a Hypothesis strategy for traffic of other hosts.
+    """Return a Hypothesis strategy for traffic of hosts other than the host under test.
 
-    `step.do(bench)` sends the drawn traffic.
+    Each drawn value is a `step`; `step.do(bench)` sends its traffic.
 
     Args:
         words: traffic to draw from: frames in candump's notation, or bytes in hex, as in

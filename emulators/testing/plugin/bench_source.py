@@ -88,7 +88,10 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return a copy of this request that has its own devices for the test, and complete paths.
+        """Return a copy of this request from which the bench of a test can be opened.
+
+        No other test has used the devices of the copy. The files of devices are found relative to
+        `folder`.
 
         Args:
             item: the test.
@@ -342,10 +345,10 @@ SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
 def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
     """Run the warm-up of a test on its bench, and return the bench for the test.
 
-    In virtual time the returned bench may be a copy of one on which the warm-up ran for an earlier
-    test. A copy is used only if the warm-up would have the same result on a new bench. Therefore
-    both benches must be equal before the warm-up, except for the seed, and the warm-up must not
-    have drawn random numbers. Hosts, triggers and tasks of the warm-up are removed.
+    In virtual time a bench may be kept after its warm-up, for later runs of the same test in a
+    campaign. A later run gets a copy of the kept bench, and needs no warm-up of its own. This
+    requires that the kept bench was equal to `bench` before the warm-up, except for the seed, and
+    that the warm-up drew no random numbers. Hosts, triggers and tasks of the warm-up are removed.
 
     Raises:
         ValueError: the bench cannot be copied after the warm-up, although it could be copied

@@ -217,13 +217,13 @@ class _BenchedTest(TestWithBench):
     ) -> None:
         """Complete pytest's report of a phase of the test with data of the bench.
 
-        If the bench blocked the phase, the report gets the reason. The report of a failure gets the
-        evidence of the bench.
+        If the bench made the phase impossible, for example because a port is missing, the report
+        becomes an error with this reason. The report of a failure gets the evidence of the bench.
 
         Args:
             report: report of the phase: setup, call or teardown.
             call: result of the phase.
-            mistaken: whether the test itself is wrong.
+            mistaken: whether the cause of a failure is a mistake in the test.
         """
         try:
             self._judge(report, call, mistaken=mistaken)

@@ -152,7 +152,8 @@ def with_plan(
     If both give a value for an output, the value of the fixture is used.
 
     Args:
-        safe: required values of the fixture, or its check.
+        safe: value of the fixture `bench_safe`: required values by the names of outputs, a function
+            that checks the bench, or None without requirements.
         plan: required values of the rig file, by device and output.
         bench: the bench.
     """

@@ -290,8 +290,10 @@ class DeviceChecks:
 
     Args:
         bench: function that makes a bench with one device.
-        remembers: whether a reset keeps more than configuration and inputs.
-        pauses: whether pauses within the host's traffic have no effect on the device.
+        remembers: whether the device keeps more than its configuration and inputs when it is reset,
+            for example stored parameters.
+        pauses: whether to check that pauses within a word of the host do not change the answers of
+            the device. The value is false if a pause ends a frame.
     """
 
     def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:

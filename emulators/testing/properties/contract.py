@@ -66,7 +66,7 @@ def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
         nothing: empty traffic of the type that the device uses: bytes or frames.
 
     Raises:
-        AssertionError: a value has a wrong type, or `inputs.changed` stays set.
+        AssertionError: a value has a wrong type, or a tick has not cleared `inputs.changed`.
     """
     now_us = device.tick_us
     for wait_us, verb, what in acts:

@@ -90,7 +90,8 @@ def waits(tick_us: int) -> st.SearchStrategy[int]:
 def values(item: InputSignal) -> st.SearchStrategy[float]:
     """Return a Hypothesis strategy for the values of a physical input.
 
-    The limits of the input, 0 and 1 are drawn more often than other values.
+    Four values are drawn more often than the others: the lower limit and the upper limit of the
+    input, and, within these limits, 0 and 1.
     """
     low, high = item.low, item.high
     ends = [value for value in (low, high, 0, 1) if low <= value <= high]

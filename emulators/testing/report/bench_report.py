@@ -140,8 +140,8 @@ class SignalSeries:
         unit: unit of the numbers, or empty if they have no unit.
         points: pairs of time in microseconds and value, with times in ascending order. Equal times
             may occur.
-        steps: whether a value holds until the next value. If false, a line connects the values.
-            Words always hold.
+        steps: whether a value holds until the next value. If false, a line connects the values. A
+            value that is a text always holds until the next value.
     """
 
     name: str

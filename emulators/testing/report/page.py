@@ -135,8 +135,8 @@ def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -
 
     Args:
         report: the report to show.
-        room_bytes: largest size of the data of tests on the page, in bytes. The page lists the data
-            that do not fit.
+        room_bytes: largest size of the data of tests on the page, in bytes. Data beyond this size
+            are left out, and the page says what is left out.
     """
     places = overview.reported(report.tests)
     unwell = [place for place in places if place.record.outcome in overview.UNWELL]
@@ -217,11 +217,12 @@ def run_page(
     """Return the HTML page about one run of a bench.
 
     Args:
-        record: the run. Its `nodeid` is the title, and its `reason` is the result.
+        record: the run, in the form of a test record. `record.nodeid` is the title of the page, and
+            `record.reason` is the result of the run.
         run: environment and settings of the run.
         wires: table of the wires: the name of a wire, its address for hosts, its rate, and its
             devices.
-        paths: diagrams in which one signal is drawn over another.
+        paths: diagrams with one signal on the x axis and another signal on the y axis.
     """
     (place,) = overview.reported([record])
     (shown,) = _on_page([place], _PAGE_BYTES)

@@ -60,8 +60,8 @@ class DeviceReader:
 
     Args:
         section: table `[device]`, or None if the file has no such table.
-        wires: wires of the file by name. The value is None for a wire of unknown type. Wires that
-            the file omits are added.
+        wires: wires of the file by name. The value is None for a wire of unknown type. If a device
+            is on a wire that the file does not describe, the reader adds the wire to this mapping.
         folder: folder that relative paths start from.
 
     Attributes:

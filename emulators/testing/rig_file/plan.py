@@ -92,12 +92,14 @@ class DeviceKind(Enum):
 class MadeDevice:
     """Keeps the device that was made in order to check a rig file, for use by the first bench.
 
+    Thus the device need not be made twice.
+
     A copy of this object, in this process or in another process, does not contain the device.
 
     Args:
-        device: a device made by `configure`, or a slave.
-        of: parameters with which the device was made. The device is not used by a bench that has
-            other parameters.
+        device: device made by `configure`, or a CANopen slave, or None if no device is kept.
+        of: parameters with which the device was made. A bench gets the device only if the
+            parameters that the bench needs are equal to these.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:
@@ -149,9 +151,10 @@ class DevicePlan:
     made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
 
     def made_of(self, seed: int = 0) -> tuple[object, ...]:
-        """Return the parameters that determine the device when it is made.
+        """Return the parameters with which the described device is made.
 
-        A device that was made with equal parameters can be used for this description.
+        If a device was made earlier with equal parameters (`MadeDevice`), it can be used as the
+        described device.
 
         Args:
             seed: seed of all random numbers, for a device on a serial line.

@@ -41,7 +41,8 @@ class Probe:
         baud: baud rate of the type of a serial device.
         node_id: node-ID of a CANopen node, from its DCF or model.
         bit_rate: bit rate of a CANopen node, from its DCF.
-        start: inputs whose initial values differ from the usual values.
+        start: initial values of inputs by name, only where the device's description gives another
+            value than the default of the input.
         made: the device, for use by a bench.
     """
 

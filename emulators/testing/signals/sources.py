@@ -42,7 +42,7 @@ class SignalSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Constant(Immutable):
-    """A signal with a constant value: a number, or the words of a text.
+    """A signal with a constant value: a number or a text.
 
     Attributes:
         setting: the value.
@@ -206,7 +206,7 @@ class ValueTable(Immutable):
             value.
         values: the value at each time.
         linear: whether to interpolate linearly. If not, each value holds until the next time.
-        repeat: whether the table starts again from 0 at its last time.
+        repeat: whether the table is repeated. If true, the last time of the table is again time 0.
     """
 
     times_us: tuple[int, ...]

@@ -62,7 +62,9 @@ def read_points(path: Path, column: str | None) -> _Points:
 
     Args:
         path: path of a CSV file, a trace, or a CAN log. The suffix selects the format.
-        column: name of a column of the CSV file or of an input of the trace, or bits of a frame.
+        column: name of a column of a CSV file, name of an input of a trace, or description of the
+            bits of a frame in a CAN log, such as `181[2:6]s*0.001`. None selects the only column
+            besides the times of a CSV file.
 
     Raises:
         ValueError: the file cannot be read, has no such column, or has no value in this column.

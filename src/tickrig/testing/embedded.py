@@ -31,11 +31,13 @@ def port(bench: Bench) -> str:
 
 @pytest.fixture(scope="session")
 def target(request: pytest.FixtureRequest) -> Any:
-    """Fixture of pytest-embedded: the value of `--target`, or labgrid's target with `--lg-env`.
+    """Fixture that replaces the fixtures `target` of pytest-embedded and of labgrid.
+
+    With the option `--lg-env`, the value is labgrid's target. Otherwise the value is that of the
+    option `--target` of pytest-embedded.
 
     labgrid and pytest-embedded both have a fixture with this name. If both are installed,
-    pytest-embedded would get the fixture of labgrid, which skips each test without `--lg-env`. This
-    fixture replaces both.
+    pytest-embedded would get the fixture of labgrid, which skips each test without `--lg-env`.
     """
     if request.config.getoption("lg_env", None):
         return request.getfixturevalue("env").get_target()

@@ -130,8 +130,8 @@ class BenchLibrary:
     def expect(self, pattern: str, within: str = "1s", device: str = "") -> str:
         """Wait for a line or a CAN frame from a device, and return it.
 
-        A line that arrived earlier counts, too, if it arrived after the line of the last
-        ``Expect``.
+        The search begins after the line that the last ``Expect`` has returned. Therefore a line
+        that arrived before this call can be found, too.
 
         Args:
             pattern: the whole line, or the frame in candump's notation; ``*`` stands for anything.

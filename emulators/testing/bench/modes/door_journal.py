@@ -30,8 +30,8 @@ class PortRecord:
     """Records the traffic of real devices and the operator's actions, for `tickrig compare`.
 
     Several host threads may use it at once. In the trace a serial line has the name of its first
-    device, and a CAN bus has its own name. The trace has no actions on nodes, because a bus is
-    compared by its frames.
+    device, and a CAN bus has its own name. Actions on CANopen nodes are not in the trace: on a CAN
+    bus, only the frames are compared.
 
     Args:
         plan: content of the rig file.
@@ -179,7 +179,8 @@ class DoorJournal(Journal):
             wire: name of the bus.
             watch: monitor of the connection that has recorded the frames.
             frames: the recorded frames.
-            by: the value 1 notes the frames, and -1 withdraws the note.
+            by: value 1 to note the frames, or -1 to withdraw this note because the frames could not
+                be sent.
         """
         with self._lock:
             self._announce(wire, watch, frames, by)

@@ -274,7 +274,8 @@ class CpuWaits:
         spares_looker: whether to omit the calling thread, which measures its own delay.
 
     Attributes:
-        worst_us: longest wait up to now in microseconds, measured over about `_LOOK_US`.
+        worst_us: longest wait of a thread up to now in microseconds. The waits of a thread are
+            added up from one update to the next, over about `_LOOK_US`.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:
@@ -285,7 +286,8 @@ class CpuWaits:
     def look(self, now_us: int) -> None:
         """Update `worst_us` with the waits of all threads, unless the last update is recent.
 
-        If the last update is too long ago, the waits since that update are ignored.
+        If the last update is too long ago, the waits since then are ignored, because they would be
+        added up over much more than `_LOOK_US`.
 
         Args:
             now_us: present time in microseconds.

@@ -142,8 +142,8 @@ class HardwareMode(BenchMode):
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
         """Return whether something is observed at a real device.
 
-        A human answers. If there is no human at the device, the condition `seen` is checked
-        instead.
+        If the operator of the device is a human, the human is asked. Otherwise the result is
+        whether the condition `seen` becomes true in time.
         """
         answer = self._operators.sees(owner, text)
         return super().observe(owner, text, seen, within_us) if answer is None else answer

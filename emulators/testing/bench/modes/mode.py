@@ -75,8 +75,9 @@ class BenchMode(ABC):
     Operations that a mode does not support raise `NotOnThisBench`.
 
     Args:
-        rig: rig with the devices. For real devices, the rig has equivalent devices and does not
-            run.
+        rig: rig with the emulated devices. If the devices of the bench are real, the rig has an
+            equivalent device for each of them. Such a rig only provides information, such as names
+            and wires; its time does not advance.
         tolerance: permitted deviations of operators and real devices.
 
     Attributes:

@@ -578,14 +578,14 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return a function that starts a fault when it is called with the time of the bench.
+        """Return a function that starts a fault; its argument is the time of the bench.
 
         Args:
             owner: name of the device or wire with the fault, or empty if the fault may belong to
                 any.
-            order: requested fault. Its short name is replaced by the full name. A human is too slow
-                for a fault that begins when a condition is true, so such a fault needs an emulator
-                as the operator.
+            order: requested fault. In `order.spec`, this method replaces a short name of the fault
+                by the full name. A human is too slow for a fault that begins when a condition is
+                true, so such a fault needs an emulator as the operator.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)

@@ -255,8 +255,10 @@ class RealMode(EmulatedMode):
     The time starts with the first connection of a host or the first wait.
 
     Args:
-        rig: rig with the devices, and with the clock and the bridges of `outside`.
-        outside: connections at which hosts find the wires. They are closed at the end.
+        rig: rig with the devices. The rig must have the clock and the bridges that `outside`
+            contains.
+        outside: connections at which hosts find the wires, with a clock and with bridges for the
+            rig. The connections are closed at the end.
     """
 
     name = "real"
@@ -324,8 +326,9 @@ class RealMode(EmulatedMode):
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Wait in real time until a condition is true; return False after the time-out.
 
-        The condition is checked between the ticks. If the condition itself receives from a device,
-        it is called in the thread of the caller instead, once per tick.
+        The thread that runs the rig checks the condition between the ticks. If the function `done`
+        itself waits for data of a device, it cannot run in this thread. Such a function is called
+        in the thread of the caller instead, once per tick.
 
         Args:
             done: function that returns whether the condition is true.

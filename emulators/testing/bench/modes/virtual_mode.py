@@ -332,8 +332,9 @@ class VirtualMode(EmulatedMode):
 
     Args:
         rig: rig with the devices.
-        limit_us: longest time in microseconds for which hosts may wait before the test itself
-            advances the time, or `NEVER` for no limit.
+        limit_us: limit on the waits of hosts, in microseconds of virtual time, or `NEVER` for no
+            limit. Whenever the test itself advances the time, the waits are counted from zero
+            again.
     """
 
     name = "virtual"
@@ -368,8 +369,9 @@ class VirtualMode(EmulatedMode):
         """Advance the virtual time until a condition is true; return False after the time-out.
 
         Without a time-out, the wait ends when there are no more events, or after a day. The
-        condition is checked after each step. In long steps it is also checked periodically, because
-        it may poll a host that has work to do.
+        condition is checked after each step. In long steps the condition is also checked
+        periodically. The reason is that the condition may call a host, and the host may have work
+        to do.
         """
         found = self._wait_until(done, within_us)
         self._limit.restart(self._rig.rig.now_us)
