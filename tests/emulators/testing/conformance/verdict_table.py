@@ -18,8 +18,8 @@ WORDS: Final = {
 """What the public checks call a verdict; where the device decides they said FAIL, and (impl)."""
 
 REASONS: Final[Mapping[tuple[str, str], str]] = {
-    ("LocalNode", "SG-01"): "an abort names an object, so a LocalNode that has not received a"
-    " request yet cannot abort. Our tester had requested other objects before",
+    ("LocalNode", "SG-01"): "an abort names the object of a request, so LocalNode cannot"
+    " abort before its first request. Our tester had requested other objects before",
     ("LocalNode", "DS-08"): "LocalNode refuses a download in segments only after the last segment."
     " CiA 301 allows this",
 }
