@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -99,10 +100,15 @@ class ExtensionGroup(Generic[T]):
         return self._checked(f"{self.what} {point.name!r} of package {package}", point.value)
 
     def _checked(self, place: str, path: str) -> T:
-        from tickrig.host.cli.start import load  # noqa: PLC0415 - slow, and often not needed
-
+        value = path.partition("[")[0].strip()
+        module, _, attribute = value.partition(":")
         try:
-            found: T = load(path.partition("[")[0].strip())
+            if module in sys.modules:
+                found: T = getattr(sys.modules[module], attribute)
+            else:
+                from tickrig.host.cli.start import load  # noqa: PLC0415 - slow, often not needed
+
+                found = load(value)
         except (Exception, SystemExit) as error:  # a foreign module may raise anything
             raise ExtensionError(f"{place} ({path}): {explain_error(error)}") from error
         if not self.accepts(found):

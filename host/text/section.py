@@ -313,10 +313,13 @@ class Section:
                 found[key] = schema[key].field(value)
             except ValueError as error:
                 self.wrong(str(error), key)
-        meant = {each for key in self.values if key not in schema for each in closest(key, schema)}
-        for key, each in schema.items():
-            if not each.default and key not in self.values and key not in meant:
-                self.wrong(f"no key {key!r}: {each.text}, {each.values}")
+        missing = [key for key, each in schema.items() if not each.default]
+        if missing := [key for key in missing if key not in self.values]:
+            unknown = [key for key in self.values if key not in schema]
+            meant = {each for key in unknown for each in closest(key, schema)}
+            for key in missing:
+                if key not in meant:
+                    self.wrong(f"no key {key!r}: {schema[key].text}, {schema[key].values}")
         return found
 
     def no_key(self, key: str, known: Iterable[str]) -> None:
