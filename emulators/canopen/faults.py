@@ -659,10 +659,14 @@ class NodeFaults(Copyable):
         Args:
             index: index of the object, such as 1014h for the EMCY.
             sub: sub-index of the object.
-            otherwise: CAN-ID to return if there is no such object.
+            otherwise: CAN-ID to return if there is no such object, and before the boot-up, when the
+                objects do not have their values yet.
         """
-        entry = self.node.slave.dictionary.find(index, sub)
-        return otherwise if entry is None else entry.number & CAN_ID_MASK
+        slave = self.node.slave
+        entry = slave.dictionary.find(index, sub)
+        if entry is None or slave.state is NmtState.INITIALISING:
+            return otherwise
+        return entry.number & CAN_ID_MASK
 
     @property
     def sdo_answer_id(self) -> int:
@@ -671,11 +675,8 @@ class NodeFaults(Copyable):
 
     @property
     def emcy_id(self) -> int:
-        """CAN-ID of the EMCY. Before the boot-up, 1014h does not have its value yet."""
-        slave = self.node.slave
-        usual = _EMCY_COB_ID + slave.node_id
-        booted = slave.state is not NmtState.INITIALISING
-        return self.cob_id(0x1014, 0, usual) if booted else usual
+        """CAN-ID of the EMCY."""
+        return self.cob_id(0x1014, 0, _EMCY_COB_ID + self.node.slave.node_id)
 
     @property
     def _error_control_id(self) -> int:

@@ -76,3 +76,6 @@ COMMANDED: Final[Mapping[int, NmtState]] = {
     NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
 """Next state by command, for each state except Initialising."""
+
+RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
+"""Commands after which a node boots again."""

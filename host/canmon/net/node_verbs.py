@@ -49,7 +49,7 @@ from tickrig.host.cli.options import NODE_ID, PATH, Choice, time_option
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted, format_time
 from tickrig.host.text.whole_file import write_whole
-from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
+from tickrig.wire.canopen.nmt import ALL_NODES, RESETS, NmtCommand, NmtState
 
 if TYPE_CHECKING:
     from tickrig.host.canmon import workspace as workspace_file
@@ -313,7 +313,6 @@ _AFTER: Final = {
     NmtCommand.RESET_NODE: (NmtState.INITIALISING,),
     NmtCommand.RESET_COMMUNICATION: (NmtState.INITIALISING,),
 }
-_RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 _ALL: Final = "all"
 
 _BOOT_UP_US: Final = 5_000_000
@@ -370,7 +369,7 @@ def _command_one(
     session.bus.command(command, node_id)
     session.work.done()
     wanted, wait_us = _AFTER[command], _LISTEN_US
-    if command in _RESETS:
+    if command in RESETS:
         wait_us = _BOOT_UP_US
     elif heartbeat_ms:
         wait_us = max(_PERIODS * heartbeat_ms * 1_000, _LISTEN_US)
@@ -380,7 +379,7 @@ def _command_one(
     elif state is not None:
         is_in, not_in = map(boot_slave.state_text, (state, wanted[0]))
         raise NodeFailed(f"node {node_id} is {is_in}, not {not_in}")
-    elif command in _RESETS:
+    elif command in RESETS:
         raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
     elif heartbeat_ms:
         raise NodeFailed(f"node {node_id}: no heartbeat within {wait_us // 1_000} ms")
@@ -414,7 +413,7 @@ def _command_all(session: NetSession, command: NmtCommand, word: str, *, yes: bo
         say(f"node {node_id}: {boot_slave.state_text(state)}")
     if not session.bus.states:
         say("sent; no node has reported its state since")
-    elif command not in _RESETS:
+    elif command not in RESETS:
         say("sent; other nodes, if there are any, have no heartbeat that tells their state")
 
 

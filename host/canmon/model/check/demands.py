@@ -540,7 +540,6 @@ class Toggle(RuleDemand):
 
 
 _RESTARTS: Final = ("boot-up", "nmt")
-_RESETS: Final = (nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION)
 
 
 class Every(RuleDemand):
@@ -602,7 +601,7 @@ class Every(RuleDemand):
         """Process an NMT command or a boot-up. A boot-up without a reset ends a silence."""
         channel, node = record.channel, decoded.node
         if decoded.kind == "nmt":
-            if decoded.signals and decoded.signals[0].value in _RESETS:
+            if decoded.signals and decoded.signals[0].value in nmt.RESETS:
                 nodes = range(1, 0x80) if node is None else (node,)
                 self._reset |= {(channel, one) for one in nodes}
             return None

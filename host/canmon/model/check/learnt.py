@@ -15,7 +15,7 @@ from itertools import islice, pairwise
 from typing import Any, Final, NamedTuple
 
 from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
-from tickrig.host.canmon.model.check.node_events import SILENT
+from tickrig.host.canmon.model.check.node_events import BusEvents
 from tickrig.host.canmon.model.frames import ident_text, ms_text, node_of, parse_ident
 from tickrig.host.text.names import closest
 from tickrig.host.text.toml_reader import load_toml
@@ -196,7 +196,7 @@ Learnt = Mapping[str, LearntBus]
 def usual_text(hit: Hit) -> str:
     """Return a finding as text, as a rule file lists usual findings."""
     where = f"node {hit.node}: " if hit.node is not None else ""
-    return f"{hit.rule}: {where}{hit.text.partition(SILENT)[0]}"
+    return f"{hit.rule}: {where}{hit.text.partition(BusEvents.SILENT)[0]}"
 
 
 def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:

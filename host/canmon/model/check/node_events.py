@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import ClassVar, Final, Literal, NamedTuple
 
 from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
 from tickrig.host.canmon.model.decode import decoded
@@ -34,7 +34,6 @@ FAULT: Final = 0x08
 _TOGGLE: Final = 0x80
 _STATES: Final = frozenset(map(int, nmt.NmtState))
 _COMMANDS: Final = frozenset(map(int, nmt.NmtCommand))
-_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
 _ANSWER_US: Final = 50_000
 """Longest time from a remote frame to the error control frame that answers it."""
 _PATIENCE_US: Final = 1_000_000
@@ -48,8 +47,6 @@ IDENTITY: Final = 0x1018
 _TOGGLE_ABORT: Final = 0x0503_0000
 _SENT: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
 """Frames that a node sends by the pre-defined connection set, as COB-IDs without the node-ID."""
-SILENT: Final = ", silent for "
-"""Beginning of the part of a text that says how long a node was silent before its boot-up."""
 
 RULES: Final = {
     "no-error-frames": "error frames",
@@ -207,6 +204,9 @@ class BusEvents:
         commanded: whether the log contains any NMT command.
     """
 
+    SILENT: ClassVar[str] = ", silent for "
+    """Beginning of the part of a text that says how long a node was silent before its boot-up."""
+
     def __init__(
         self,
         bus: BusFrames,
@@ -288,7 +288,7 @@ class BusEvents:
 
     def _command(self, at_us: int, command: int, target: int) -> None:
         nodes = list(self.nodes) if target == nmt.ALL_NODES else [target]
-        if command in _RESETS and target == nmt.ALL_NODES:
+        if command in nmt.RESETS and target == nmt.ALL_NODES:
             self._reset |= self._first.keys() - self.nodes.keys()
         self.cuts.append(Cut(at_us, target))
         if command == nmt.NmtCommand.STOP:
@@ -296,7 +296,7 @@ class BusEvents:
             self._hit("nmt-stop", target or None, nmt.NMT_COB_ID, f"NMT stops {whom}")
         for node in nodes:
             one = self.nodes[node]
-            if command in _RESETS:
+            if command in nmt.RESETS:
                 one.reset, one.command = True, None
                 one.beat_events.append(BeatEvent(at_us, self._row, "order"))
             else:
@@ -332,7 +332,7 @@ class BusEvents:
                 self._control_hit("doubled-node", node, said)
             else:
                 silent_us = 0 if self._untimed else at_us - self._last_frame_us(node)
-                silent = f"{SILENT}{ms_text(silent_us)} ms before" if silent_us > 0 else ""
+                silent = f"{self.SILENT}{ms_text(silent_us)} ms before" if silent_us > 0 else ""
                 self._control_hit("no-reboot", node, f"boots again without an NMT reset{silent}")
         one.boots.append(self._row)
         one.reset, one.state, one.command = False, int(nmt.NmtState.INITIALISING), None

@@ -275,7 +275,6 @@ _BOOT_UP: Final = bytes([nmt.NmtState.INITIALISING])
 _ERROR_CONTROL_IDS: Final = range(nmt.ERROR_CONTROL_COB_ID + 1, nmt.ERROR_CONTROL_COB_ID + 0x80)
 _ANSWER_IDS: Final = range(sdo_frame.RESPONSE_COB_ID + 1, sdo_frame.RESPONSE_COB_ID + 0x80)
 _REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_ID + 0x80)
-_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
 
 
 class _Resets:
@@ -288,7 +287,7 @@ class _Resets:
         """Process an NMT command."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        if len(frame.data) != 2 or frame.data[0] not in _RESETS:
+        if len(frame.data) != 2 or frame.data[0] not in nmt.RESETS:
             return
         target = frame.data[1]
         for node in range(1, 0x80) if target == nmt.ALL_NODES else (target,):
@@ -341,7 +340,7 @@ class Heartbeat(Rule):
     def selection(self, ident: int, /) -> FrameSelection:
         """Select frames that arrive too early or too late, boot-ups, and resets."""
         if ident == nmt.NMT_COB_ID:
-            return FrameSelection(first_bytes=_RESETS)
+            return FrameSelection(first_bytes=nmt.RESETS)
         _, low_us, high_us = self._times
         return FrameSelection(low_us, high_us, frozenset(_BOOT_UP), firsts=True)
 
@@ -586,7 +585,7 @@ class NoLostHeartbeat(Rule):
 
     def selection(self, ident: int, /) -> FrameSelection:
         """Select all frames of nodes, and resets."""
-        return FrameSelection(first_bytes=_RESETS if ident == nmt.NMT_COB_ID else frozenset())
+        return FrameSelection(first_bytes=nmt.RESETS if ident == nmt.NMT_COB_ID else frozenset())
 
     def begin(self, at_us: int, /) -> None:
         """Record the start of listening."""
@@ -891,7 +890,7 @@ class NoReboot(_CanopenRule):
     def selection(self, ident: int, /) -> FrameSelection:
         """Select resets and boot-ups. The first other frame marks a node as active."""
         if ident == nmt.NMT_COB_ID:
-            return FrameSelection(first_bytes=_RESETS)
+            return FrameSelection(first_bytes=nmt.RESETS)
         boot_up = frozenset(_BOOT_UP) if ident in _ERROR_CONTROL_IDS else frozenset()
         return FrameSelection(first_bytes=boot_up, firsts=True)
 
@@ -901,7 +900,7 @@ class NoReboot(_CanopenRule):
         assert isinstance(frame, CanFrame)
         node = sender_of(frame.can_id)
         if node is None:
-            if len(frame.data) == 2 and frame.data[0] in _RESETS:
+            if len(frame.data) == 2 and frame.data[0] in nmt.RESETS:
                 self._expect_reset(frame.data[1])
             return None
         is_new = (record.channel, node) not in self._present
