@@ -522,12 +522,15 @@ class Load:
     """Bus load: counter of the bits in each second, counted from the first frame.
 
     A frame whose time is before that of a previous frame counts for the present second.
+
+    Attributes:
+        begin_us: start of the open second in microseconds.
     """
 
-    __slots__ = ("_begin_us", "_bits", "_ended", "_first_us", "_open_bits", "_peak")
+    __slots__ = ("_bits", "_ended", "_first_us", "_open_bits", "_peak", "begin_us")
 
     def __init__(self, first_us: int) -> None:
-        self._first_us = self._begin_us = first_us
+        self._first_us = self.begin_us = first_us
         self._bits = self._open_bits = 0
         self._ended = self._peak = BusSecond(first_us, 0)
 
@@ -539,12 +542,12 @@ class Load:
             that second, otherwise None.
         """
         self._bits += bits
-        if at_us < self._begin_us + WINDOW_US:
+        if at_us < self.begin_us + WINDOW_US:
             self._open_bits += bits
             return None
-        ended = self._ended = BusSecond(self._begin_us, self._open_bits)
+        ended = self._ended = BusSecond(self.begin_us, self._open_bits)
         self._peak = max(self._peak, ended, key=lambda second: second.bits)
-        self._begin_us, self._open_bits = _window_begin(self._first_us, at_us), bits
+        self.begin_us, self._open_bits = _window_begin(self._first_us, at_us), bits
         return ended
 
     def end(self, end_us: int) -> BusSecond:
@@ -556,13 +559,8 @@ class Load:
         Args:
             end_us: end of the traffic in microseconds.
         """
-        span_us = min(end_us - self._begin_us, WINDOW_US)
+        span_us = min(end_us - self.begin_us, WINDOW_US)
         return self._open(span_us if span_us >= LEAST_WINDOW_US else WINDOW_US)
-
-    @property
-    def begin_us(self) -> int:
-        """Start of the open second in microseconds."""
-        return self._begin_us
 
     def row(self, now_us: int, last_us: int, *, ended: bool = False) -> _LoadRow:
         """Return the load of the bus until now.
@@ -573,7 +571,7 @@ class Load:
             ended: whether no more frames follow, so that the last second is judged although it is
                 incomplete.
         """
-        span_us = max(last_us, self._begin_us) - self._first_us
+        span_us = max(last_us, self.begin_us) - self._first_us
         last = self.end(last_us) if ended else self._open(WINDOW_US)
         if span_us < WINDOW_US:
             last = self._open(span_us or WINDOW_US)
@@ -585,7 +583,7 @@ class Load:
         )
 
     def _open(self, span_us: int) -> BusSecond:
-        return BusSecond(self._begin_us, self._open_bits, span_us)
+        return BusSecond(self.begin_us, self._open_bits, span_us)
 
     def _latest(self, now_us: int) -> BusSecond:
         begin_us = _window_begin(self._first_us, now_us) - WINDOW_US

@@ -10,7 +10,7 @@ from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.line_source import RrcLines, RtcLiteLine
-from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame, data_frame
 
 CAN_IDS = st.sampled_from((0x000, 0x080, 0x085, 0x100, 0x185, 0x205, 0x585, 0x605, 0x705, 0x7E4))
 COMMANDS = st.sampled_from(range(0x100))
@@ -25,7 +25,7 @@ SDO = st.builds(
     st.integers(0, 3),
     st.binary(min_size=4, max_size=4),
 )
-ANY = st.builds(CanFrame, st.one_of(CAN_IDS, st.integers(0, 0x7FF)), st.binary(max_size=8))
+ANY = st.builds(data_frame, st.one_of(CAN_IDS, st.integers(0, 0x7FF)), st.binary(max_size=8))
 REMOTE = st.builds(lambda can_id: CanFrame(can_id, remote=True), CAN_IDS)
 WIDE = st.builds(lambda data: CanFrame(0x18FF_0000, data, extended=True), st.binary(max_size=8))
 ERRORS = st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8))
