@@ -793,7 +793,8 @@ class NodeFaults(Copyable):
         return left
 
     def _kind_of_received(self, frame: CanFrame) -> _NodeFrames:
-        if frame.remote or frame.extended:
+        deaf = self.node.slave.state is NmtState.INITIALISING  # it uses up no fault
+        if deaf or frame.remote or frame.extended:
             return _NO_FRAMES
         request_id = sdo_frame.REQUEST_COB_ID + self.node.slave.node_id
         if frame.can_id == self.cob_id(0x1200, 1, request_id):

@@ -13,6 +13,7 @@ from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
+import can
 import canopen
 import pytest
 from click.testing import CliRunner, Result
@@ -618,6 +619,26 @@ def test_faults_of_a_node_in_real_time(tmp_path: Path) -> None:
         bench.clear("bus_off")
         assert bench.wait_until(lambda: bench.get("can_state") == "error-active", "5s")
     logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize("fault_name", ["sdo_abort", "sdo_mute", "sync_lost"])
+def test_no_fault_acts_on_what_a_node_receives_before_the_boot_up(fault_name: str) -> None:
+    with Bench("epos") as bench, bench.can_bus() as bus:
+        bench["epos"].fault(fault_name)
+        bus.send(
+            can.Message(
+                arbitration_id=0x601,
+                data=bytes([0x40, 0, 0x10, 0, 0, 0, 0, 0]),
+                is_extended_id=False,
+            )
+        )
+        bus.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+        heard = [bus.recv(0.1) for _ in range(3)]
+        answer = bench._mode.request("faults")
+    ids = {message.arbitration_id for message in heard if message is not None}
+    assert isinstance(answer["faults"], list)
+    acted = {row["name"]: row["acted"] for row in answer["faults"]}
+    assert (ids, acted[fault_name]) == ({0x701}, 0)
 
 
 @pytest.mark.parametrize("fault_name", ["emcy_storm", "babble"])
