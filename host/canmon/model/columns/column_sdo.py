@@ -547,11 +547,12 @@ class _Talk:
         if dialogue.before[row] != 0:  # within a transfer
             received, size = channel.received()
             done = int(dialogue.done[row])
-            last = min(last, done - 2)
+            ends = done <= last  # else it is a pair of another chain, perhaps of another channel
+            last = done - 2 if ends else last
             if last >= row:
                 self.parts.append(_Part(row, last, received, size))
                 self._segments(channel, row, last)
-            return self._pair(channel, done) if done == last + 2 else last + 2
+            return self._pair(channel, done) if ends else last + 2
         self.parts.append(_Part(row, last))
         if dialogue.after[last] == 0:
             channel.end_exchanges()

@@ -189,6 +189,18 @@ def test_dialogues_mean_the_same_in_columns(records: list[Record], size: int, na
     assert_alike(records, size, eds)
 
 
+def test_a_transfer_of_another_node_does_not_end_one_that_goes_on() -> None:
+    frames = [
+        CanFrame(0x606, bytes.fromhex("4000200000000000")),
+        *(CanFrame(0x605, bytes.fromhex("4000200000000000")),) * 2,
+        CanFrame(0x585, bytes.fromhex("410020000F000000")),
+        CanFrame(0x605, bytes.fromhex("6000000000000000")),
+        CanFrame(0x586, bytes.fromhex("4200200000000000")),
+        CanFrame(0x585, bytes.fromhex("0000100000000000")),
+    ]
+    assert assert_alike(at_each_ms(frames), 7)[0] == "6 sdo upload of 2000h:00 asked for"
+
+
 WORDS = (
     *((), ("-x", "-t", "d"), ("--to", "0.01"), ("--from", "0.005"), ("-F", "sdo")),
     *(("-F", "node=5 and not heartbeat"), ("--jsonl",)),
