@@ -746,18 +746,27 @@ class _Object:
             at_us: time of the frame in microseconds.
             decoded: meaning of the frame.
         """
-        if self.found is None and len(self._known) < _MOST_HEARD:
+        if self.found is None:
+            self._look(decoded)
+        if self.found is None or decoded.node != self.found[0]:
+            return
+        name = self.found[1]
+        for signal in decoded.signals:
+            if signal.name == name and (value := self._wanted.value(signal)) is not None:
+                is_named = self._is_state and signal.text
+                state = (drive_state(int(value)) or signal.text) if is_named else ""
+                self.series.append_state(at_us, value, state)
+
+    def _look(self, decoded: Decoded) -> None:
+        """Keep the names in a frame, and find the object if the frame contains it."""
+        if len(self._known) < _MOST_HEARD:
             self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
             return
         for signal in decoded.signals:
-            place = decoded.node, signal.name
-            if self.found is None and signal.name.lower().startswith(self._wanted.name):
-                self._find(place, signal.unit)
-            if place == self.found and (value := self._wanted.value(signal)) is not None:
-                is_named = self._is_state and signal.text
-                name = (drive_state(int(value)) or signal.text) if is_named else ""
-                self.series.append_state(at_us, value, name)
+            if signal.name.lower().startswith(self._wanted.name):
+                self._find((decoded.node, signal.name), signal.unit)
+                return
 
     def _find(self, place: tuple[int | None, str], unit: str) -> None:
         """Keep the first object that fits, and use its name for the curve."""
