@@ -399,12 +399,16 @@ class _BusJudge:
         if self._bit_rate is None:
             self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
             return
+        first_us = self._times[0]
+        if self._end_us - first_us < _LOAD_US:
+            self.unjudged["max-load"] = f"the traffic lasts less than {_LOAD_US / 1e6:g} s"
+            return
         self.judged.add("max-load")
-        first_us, most = self._times[0], _MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
+        most = _MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
         steps = self._bits_by_step(first_us)
         width, total, over_us = _LOAD_US // _LOAD_STEP_US, 0, first_us
         window: deque[int] = deque()
-        for step in sorted(steps) if self._end_us - first_us >= _LOAD_US else ():
+        for step in sorted(steps):
             window.append(step)
             total += steps[step]
             while window[0] <= step - width:

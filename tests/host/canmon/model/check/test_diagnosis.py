@@ -242,6 +242,13 @@ def test_without_times_nothing_is_judged_by_them() -> None:
     assert "no-lost-heartbeat" in found.unjudged
 
 
+@pytest.mark.parametrize(("step_us", "judged"), [(99_999, False), (100_000, True)])
+def test_the_load_of_a_short_log_is_not_judged(step_us: int, judged: bool) -> None:
+    found = diagnose([lines("701#00 701#7F 701#7F 701#7F 701#7F 701#7F", step_us)], 125_000)
+    assert ("max-load" in found.judged) is judged
+    assert judged or found.unjudged["max-load"] == "the traffic lasts less than 0.5 s"
+
+
 def test_an_emcy_before_the_first_boot_up_is_no_sign_of_life() -> None:
     (fault,) = diagnose([lines("081#0050010000000000 701#00 701#7F 701#7F")]).faults
     assert fault.rule == "no-emcy"
