@@ -111,8 +111,9 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
     """Return the text of the output file that an option of `canmon conform` requests.
 
     Args:
-        option: name of the option. `--html`, `--junit`, `--badge` and `--issue` each have their own
-            text. Any other option requests a baseline file, which lists the failures of the run.
+        option: name of the option. The options `--html`, `--junit`, `--badge` and `--issue` each
+            request a report in a different form. Any other name stands for the option that requests
+            a baseline file, which lists the failures of the run.
         report: report of the run.
         baseline: failures that the user has declared as known.
         show: function that formats the recorded frames as lines.
@@ -138,9 +139,9 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 def decoded_frames(eds: Mapping[int, Path]) -> ShowFrames:
     """Return a function that formats the recorded frames of a check and their meaning.
 
-    Each call of the returned function decodes the frames of one check. Only the EDS is known at the
-    beginning of a call. SDO transfers and PDO mappings of earlier checks are unknown, because the
-    frames between two checks are not recorded.
+    Each call of the returned function decodes the frames of one check. At the beginning of a call,
+    the decoder knows only the content of the EDS. It does not know the SDO transfers and PDO
+    mappings of earlier checks, because the frames between two checks are not recorded.
 
     Args:
         eds: EDS file, or the objects that were read from it, by node-ID.

@@ -166,7 +166,7 @@ class SignalStimulus(ABC):
 
     @abstractmethod
     def unit(self, name: str) -> str:
-        """Return the unit of a signal such as `mm`, or the data type of an object.
+        """Return the unit of a signal, such as `mm`. For an object, return its data type.
 
         If neither is known, the result is empty.
         """
@@ -218,12 +218,13 @@ _PATIENCE_S: Final = 30
 
 
 def open_stimulus(text: str) -> Stimulus:
-    """Return the stimulus that operates the inputs of the node under test, by `--stimulus`.
+    """Return the stimulus that operates the inputs of the node under test.
 
     Args:
-        text: value of the option. `ask` asks the user to operate the inputs. `control:PATH`, or the
-            path of a control socket, uses the emulator that serves the socket. Any other text is a
-            command with its arguments.
+        text: value of the option `--stimulus`. For `ask`, the user is asked to operate the inputs.
+            For `control:PATH` or the path of a control socket, the emulator that serves this socket
+            operates them. For any other text, which is a command with its arguments, the command
+            operates them.
 
     Raises:
         Refused: the text is not a command line, or `ask` is used without a terminal.
@@ -466,10 +467,10 @@ class Consent:
         The user is not asked in these cases:
 
         - With the option `--yes`, the answer is yes.
-        - If the node is emulated in virtual time, the answer is also yes. But if other nodes are on
-          its bus, the answer is no for LSS commands to all nodes, because the other nodes would
-          also answer.
-        - In all other cases without a terminal, the answer is no.
+        - If the node is emulated in virtual time, the answer is also yes, with one exception: if
+          other nodes are on the bus, the answer to the question about LSS commands to all nodes is
+          no.
+        - In any other case, if there is no terminal, the answer is no.
         """
         if self._yes:
             return True

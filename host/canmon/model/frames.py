@@ -132,7 +132,10 @@ def any_ident(frame: CanFrame | FdFrame) -> int:
 
 
 def frame_of(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
-    """Return the frame with an identifier and its flags. The payload is a little-endian number."""
+    """Make a frame from an identifier with the flags of `ident_of` or the flag `ERROR`.
+
+    The payload is a little-endian number.
+    """
     data = payload.to_bytes(MAX_DATA_BYTES, "little")
     if ident & ERROR:
         return ErrorFrame(ident & ERROR_CLASS_MASK, data)
@@ -227,9 +230,10 @@ def flagged_id(record: Record) -> int:
 class CandumpFilter:
     """A filter of CAN frames in the notation of candump, such as `123:7FF,400~700,#FF`.
 
-    A frame passes if it matches at least one rule. If `j` is one of the words, the frame must match
-    all rules. Without a rule, all frames pass. An error frame passes only if `#MASK` selects its
-    class.
+    A filter is a list of words between commas. A word such as `123:7FF` is a rule. A frame passes
+    if it matches at least one rule. If the filter contains the word `j`, a frame must match all
+    rules. If the filter contains no rule, all frames pass. For error frames, only the word `#MASK`
+    matters: an error frame passes if the bit of its error class is set in the number MASK.
 
     Attributes:
         rules: CAN-ID, mask, and whether the rule is inverse, for each rule.
@@ -349,9 +353,9 @@ def stamp_text(
         stamp: format of the time.
         at_us: time to write, in microseconds.
         origin_us: time of the first frame.
-        before_us: time of the previous item.
-        digits: two minimum numbers of digits before the decimal point. The first number applies to
-            an absolute time, the second one to a time since another frame.
+        before_us: time of the previous line.
+        digits: minimum numbers of digits before the decimal point: first the number for absolute
+            times, then the number for times that count from `origin_us` or `before_us`.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
@@ -374,7 +378,7 @@ class DumpLines:
             ESI.
 
     Attributes:
-        form: format of the time at the beginning of each line.
+        form: value of the argument `stamp`.
         first_us: time of the first frame, or None before the first frame.
         last_us: time of the last frame.
         width: width of the identifier column in digits.

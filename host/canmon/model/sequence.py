@@ -59,9 +59,10 @@ _LONGEST: Final = 1_000
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
     """Replace the fields of a sequence step, such as `{id}` or `{id:3}`, by numbers.
 
-    In a text with a `#`, which is a frame, a field becomes two hex digits. In any other text, a
-    field becomes a decimal number. A format after a colon changes this: `:3` means three hex
-    digits, `:i16` two bytes with the low byte first, and `:d` a decimal number.
+    A text that contains a `#` is a frame. In a frame, a field becomes two hex digits. In any other
+    text, a field becomes a decimal number. If a format follows the name in the field, the format
+    decides: with `:3`, the field becomes three hex digits, with `:i16` two bytes with the low byte
+    first, and with `:d` a decimal number.
 
     Raises:
         ValueError: a variable is unknown, a value is not a whole number, or a number does not fit.
@@ -480,10 +481,8 @@ class TomlSequence:
         text: content of the file.
         file: name of the file for messages.
         variables: values by name, which override those of the table `[vars]` in the file.
-        resolve: function that makes a frame from the text of a step that is not in candump
-            notation.
-        condition: function that makes a condition from an expected text that is not a pattern of a
-            frame.
+        resolve: function that converts a text without a `#` in a `send` step to a frame.
+        condition: function that converts a text without a `#` in an `expect` step to a condition.
     """
 
     def __init__(

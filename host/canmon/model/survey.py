@@ -48,7 +48,9 @@ _MOST_SIGNALS: Final = 400
 
 
 class TimeBins(Generic[_Key]):
-    """Sums over time: the time axis is divided into spans of equal width, each with sums by key.
+    """Sums over time. The time axis is divided into spans of equal width.
+
+    Each span has one sum for each key, such as the number of bits on each bus.
 
     If a later time would need too many spans, the width is doubled and the spans are merged. The
     memory is therefore limited.
@@ -59,8 +61,8 @@ class TimeBins(Generic[_Key]):
 
     Attributes:
         width_us: present width of a span in microseconds.
-        sums: sum of the amounts in each span, by key and then by number of the span.
-        ranges: least and greatest value in each span, by key and then by number of the span.
+        sums: for each key, the sums of the amounts by number of the span.
+        ranges: for each key, the least and greatest values by number of the span.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:

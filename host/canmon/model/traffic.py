@@ -232,11 +232,10 @@ class BitRow(NamedTuple):
 class BitMemory:
     """Counter of the changes of each payload bit of one CAN-ID.
 
-    All counters are updated at once: one big integer holds one binary digit of all counters. A
-    payload that is shorter than the previous one is padded with zeros.
+    A payload that is shorter than the previous one is padded with zeros.
 
     Attributes:
-        notched: bits whose changes the user marked as known.
+        notched: bits whose changes the user marked as known, so they are not shown.
     """
 
     __slots__ = ("_latest", "_payload", "_planes", "notched")
@@ -385,8 +384,8 @@ class BitRates(NamedTuple):
     def bits(self, frame: can.FdFrame) -> int:
         """Return the duration of a CAN FD frame on the bus, in bits of the nominal rate.
 
-        The number is rounded up. If a rate is unknown, bits at the fast rate count as bits at the
-        nominal rate, so the real duration is shorter.
+        The number is rounded up. If a rate is unknown, the bits of the data phase are counted as
+        bits of the nominal rate. The result is then longer than the real duration.
         """
         nominal, fast = can.fd_bits(frame)
         if self.nominal and self.fast:
@@ -521,10 +520,11 @@ class _LoadRow(NamedTuple):
 class Load:
     """Bus load: counter of the bits in each second, counted from the first frame.
 
-    A frame whose time is before that of a previous frame counts for the present second.
+    If the time of a frame is before that of a previous frame, its bits count for the current
+    second.
 
     Attributes:
-        begin_us: start of the open second in microseconds.
+        begin_us: start of the current second in microseconds.
     """
 
     __slots__ = ("_bits", "_ended", "_first_us", "_open_bits", "_peak", "begin_us")
@@ -538,8 +538,8 @@ class Load:
         """Count the bits of a frame.
 
         Returns:
-            The bits counted in the second that is now complete, if the frame is the first one after
-            that second, otherwise None.
+            If the frame is the first one after the current second, the bits of this complete
+            second, otherwise None.
         """
         self._bits += bits
         if at_us < self.begin_us + WINDOW_US:
@@ -568,8 +568,8 @@ class Load:
         Args:
             now_us: present time in microseconds.
             last_us: time of the latest frame or error frame in microseconds.
-            ended: whether no more frames follow, so that the last second is judged although it is
-                incomplete.
+            ended: whether the traffic has ended. If True, the load of the last second is calculated
+                as in `end`, because this second may be incomplete.
         """
         span_us = max(last_us, self.begin_us) - self._first_us
         last = self.end(last_us) if ended else self._open(WINDOW_US)
@@ -611,7 +611,7 @@ class BusRow(NamedTuple):
         went_back: number of frames whose time is earlier than that of the previous frame.
         fd: number of CAN FD frames.
         unrated: number of CAN FD frames whose data was sent at an unknown bit rate. If it is not 0,
-            the real load is higher than the calculated load.
+            the real load is lower than the calculated load.
     """
 
     channel: str

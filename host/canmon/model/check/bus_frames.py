@@ -29,7 +29,9 @@ _SPIKE_FRAMES: Final = 3
 
 
 class FramePlace(NamedTuple):
-    """The number and time of a frame in a log, by which a fault names the frames that show it.
+    """The number and time of a frame in a log.
+
+    A fault has such a pair for each frame that shows the fault.
 
     Attributes:
         number: position of the frame in the log. The first frame has number 1.
@@ -153,9 +155,10 @@ class BusFrames:
         return len(self) >= _MANY and find_spec("numpy") is not None
 
     def picked(self, column: array[int], rows: Sequence[int]) -> Sequence[int]:
-        """Return the values of some rows of one array of this class.
+        """Return the values of some frames from one of the arrays, such as `at_us`.
 
-        If `rows` is a numpy array, the values are returned as a numpy array, otherwise as a list.
+        `rows` contains the indices of the frames. If `rows` is a numpy array, the values are
+        returned as a numpy array, otherwise as a list.
         """
         if isinstance(rows, list | tuple | range):
             return [column[row] for row in rows]
@@ -181,8 +184,8 @@ class BusFrames:
 def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], list[int]]:
     """Return the corrected times of a bus, and the rows at which the clock was set back.
 
-    If only a few frames are out of order, each of them gets the time of a neighbouring frame. If
-    the clock of the recorder was set back, the times from that row on are not corrected.
+    If only a few successive frames are out of order, each of them gets the time of a neighbouring
+    frame. If the clock of the recorder was set back, the times after this moment stay as recorded.
 
     Args:
         bus: frames of the bus.
@@ -251,8 +254,9 @@ class FrameKeeper:
 
         Args:
             number: position of the frame in the log. The first frame has number 1.
-            frames: number of frames to return before the frame, and also after it. None of these
-                may be a CAN FD frame.
+            frames: number of frames to return before the frame, and also after it. The caller must
+                make sure that none of these is a CAN FD frame, because only 8 data bytes of each
+                frame are stored.
 
         Returns:
             The position in the log of the first returned frame, and the frames in the order of the

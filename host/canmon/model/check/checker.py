@@ -78,7 +78,10 @@ class Unjudged(NamedTuple):
 
 
 class RuleCheck:
-    """Base class of the checks by rules. It reports the findings at the end of the traffic.
+    """Base class of the checkers that compare traffic with rules.
+
+    The subclasses process the frames. This class judges the bus load, and what is known only at the
+    end of the traffic, such as missing frames.
 
     Args:
         rules: rules to check.
@@ -111,7 +114,7 @@ class RuleCheck:
 
         Args:
             channel: name of the bus.
-            window: second to judge, with the number of its bits.
+            window: the second, and the number of bits that were sent on the bus in it.
         """
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
@@ -256,7 +259,8 @@ class Checker(RuleCheck):
             lost: messages of the source about lost frames, and about lines of a log that are not
                 frames.
             judged_us: end of the traffic in microseconds for rules that the user wrote as
-                expressions. None stands for `end_us`.
+                expressions. For frames from standard input, it is the time of the latest frame.
+                None means that it is equal to `end_us`.
             errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)

@@ -155,9 +155,10 @@ class _BusSelection:
         self._frames = np.empty(0, np.int64)
 
     def take(self, frames: Columns) -> tuple[Ints, Ints]:
-        """Return the rows of the frames to judge one by one, and the time gap before each of them.
+        """Return the rows of the frames that must be judged, and the time gap before each of them.
 
-        Other frames cannot violate a rule or change its state, so they are only counted.
+        The caller must judge these frames. All other frames can neither violate a rule nor change
+        the state of a rule, so this method only counts them.
 
         Args:
             frames: block of frames of one bus.

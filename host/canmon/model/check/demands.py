@@ -37,7 +37,7 @@ _EVENT_KINDS: Final = frozenset(["emcy", "nmt", "lss", "time", "error"])
 
 
 class AtFrames:
-    """Test of signals at certain frames, as `tpdo1 and 3.statusword.fault` has it.
+    """Test of signals at the frames that other tests select, as in `tpdo1 and 3.statusword.fault`.
 
     If a selected frame does not contain one of the signals, the latest value of this signal on the
     bus is used. For the signals in `_EVENT_SIGNALS`, earlier values are never used. To know the
@@ -46,9 +46,9 @@ class AtFrames:
     Args:
         frames: tests that select the frames.
         states: tests of signals, each with the names of its signals.
-        each: whether the tests select a kind of frames, such as `tpdo1`, and not only a sender,
-            such as `node 3`. If False, earlier values are never used: a frame must contain the
-            signals.
+        each: True if the tests in `frames` select a kind of frames, such as `tpdo1`. False if they
+            select only a sender, such as `node 3`. If False, earlier values are never used, so a
+            frame must contain the signals itself.
     """
 
     def __init__(
@@ -162,8 +162,9 @@ class RuleEvent:
     def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
         """Return a function that finds the value to judge in a frame.
 
-        If the event is a signal, the function returns this signal. For any other event, it returns
-        the first signal of a frame that passes the filter. Without such a signal, it returns None.
+        If the event is the name of a signal, the function returns this signal. For any other event,
+        the function returns the first signal of each frame that the event selects. If there is no
+        such signal in the frame, the function returns None.
         """
         matches = self.matches
         if self.is_signal:
@@ -262,12 +263,13 @@ MOST_COUNTED: Final = 10_000
 class Truth(RuleDemand):
     """Demand that a condition on signals is always true, or that it is never true.
 
-    A violation is reported when it begins. As long as it lasts, it is not reported again. Two kinds
-    of frames are always reported if they violate the demand:
+    A violation is reported when it begins. As long as the violation lasts, it is not reported
+    again. Only for two kinds of frames, each frame that violates the demand is reported:
 
     - EMCY, NMT, LSS, TIME and error frames.
-    - Frames that the condition selects but that do not contain its signals. In `tpdo1 of 3 and node
-      3 stopped`, the TPDO does not contain the NMT state.
+    - Frames of a kind that the condition names, if they do not contain the signals of the
+      condition. For example, `tpdo1 of 3 and node 3 stopped` names a TPDO, and this TPDO does not
+      contain the NMT state.
 
     Args:
         event: condition on signals, such as `position > 100`.
@@ -471,9 +473,9 @@ class Toggle(RuleDemand):
 
     The toggle bit must be 0 in the first answer after a boot-up.
 
-    A frame counts as an answer if it follows a request. If the log contains no requests, frames
-    count as answers as soon as one of them has the toggle bit set. A node that produces heartbeats
-    is not judged, because it does not answer guarding requests.
+    If the log contains requests, a frame is an answer if it follows a request. If the log contains
+    no requests, the first frame whose toggle bit is set and all later frames are answers. A node
+    that produces heartbeats is not judged, because it does not answer guarding requests.
 
     Args:
         event: event that selects the nodes to judge. A node stays selected after its first matching
@@ -825,8 +827,8 @@ class Follow(RuleDemand):
     """Base class of demands that compare each value with the previous value from the same CAN-ID.
 
     Args:
-        event: name of a signal, or event that selects frames. Of a selected frame, the first value
-            is used.
+        event: name of a signal, whose values are compared, or event that selects frames. In a
+            selected frame, the value of the first signal is compared.
     """
 
     def __init__(self, event: RuleEvent) -> None:

@@ -164,12 +164,14 @@ class LearntBus:
     """Rules for one bus that were learnt from a good log, to be compared with a `BusSummary`.
 
     Attributes:
-        frames: requirements for the frames of each CAN-ID, by CAN-ID with flags.
+        frames: requirements for the frames of each CAN-ID. Each key is a CAN-ID with the flag bits
+            that `ident_of` adds.
         nodes: requirements for each node, by node-ID.
         boot_order: node-IDs in the required order of boot-ups. Nodes in one group may boot in any
             order.
         bits_per_second: largest allowed bus load in bits per second, or None for no limit.
-        usual: texts of faults that also occurred in the good log, and are therefore not reported.
+        usual: texts of the faults that occurred in the good log. Faults with these texts are not
+            reported.
         others: whether CAN-IDs that are not in `frames` are allowed.
     """
 

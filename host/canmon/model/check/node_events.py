@@ -84,10 +84,10 @@ class BeatEvent(NamedTuple):
     Attributes:
         at_us: time of the event in microseconds.
         row: row of the event.
-        kind: kind of the event: `boot` for a boot-up without an NMT reset, `excuse` for a boot-up
-            after a reset, `order` for an NMT reset or a write to 1017h. The node is expected to
-            send heartbeats until a `boot` or an `order`. Before an `excuse`, missing heartbeats are
-            not a fault.
+        kind: kind of the event. The kind `boot` is a boot-up without an NMT reset, the kind
+            `excuse` is a boot-up after an NMT reset, and the kind `order` is an NMT reset or a
+            write to 1017h. Missing heartbeats before an event of the kind `excuse` are no fault.
+            Missing heartbeats before any other event are a fault.
     """
 
     at_us: int

@@ -215,9 +215,9 @@ class Rule:
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Return the reason why the rule has judged nothing, so that it does not count as passed.
 
-        By default, a rule has judged something if a frame that it wants has arrived. Rules about
-        error frames, and rules with their own `end`, always judge something, because they also
-        judge that frames are absent.
+        By default, a rule has judged something if a frame has arrived for which `wants` returns
+        True. Two kinds of rules always judge something, because they also judge that frames are
+        absent: rules about error frames, and rules whose class overrides `end`.
 
         Args:
             evidence: summary of the traffic, which has at least one frame or error frame.
@@ -294,7 +294,7 @@ class _Resets:
             self._at_us.setdefault((record.channel, node), record.at_us)
 
     def ended(self, record: Record, node: int) -> int | None:
-        """Return the time of the reset that a boot-up follows, or None if there was no reset."""
+        """Return the time of the NMT reset before a boot-up, or None if there was no reset."""
         return self._at_us.pop((record.channel, node), None)
 
 
@@ -315,9 +315,9 @@ class HeartbeatTimes(NamedTuple):
 class Heartbeat(Rule):
     """Rule that the heartbeats of one node arrive neither too early nor too late.
 
-    The first heartbeat after a boot-up may arrive at any time. If a boot-up follows a heartbeat,
-    only the upper limit applies. If an NMT command has reset the node, the time from the heartbeat
-    to this command is judged, otherwise the time to the boot-up.
+    The first heartbeat after a boot-up may arrive at any time. For the time after the last
+    heartbeat before a boot-up, only the upper limit applies. This time ends at the NMT command that
+    has reset the node. If no NMT command has reset the node, this time ends at the boot-up.
 
     Args:
         times: node-ID, and limits of the time between two heartbeats.
@@ -386,10 +386,11 @@ class Heartbeat(Rule):
             yield text
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Report that there was no gap to compare.
+        """Return the reason why nothing was judged, if there was no gap to compare.
 
-        The gap from a boot-up to the next heartbeat does not count as a gap here. The gap from the
-        last heartbeat to a boot-up counts only if no NMT command has reset the node.
+        If there was a gap, the result is an empty text. The gap from a boot-up to the next
+        heartbeat is not compared. The gap from the last heartbeat to a boot-up is compared only if
+        no NMT command has reset the node.
         """
         if evidence.untimed:
             return ONE_TIME
@@ -552,9 +553,9 @@ class NoLostHeartbeat(Rule):
     """Rule that a node which sends heartbeats does not omit any.
 
     The expected period comes from 1017h in SDO traffic. If 1017h was not transferred, the measured
-    period is used, or otherwise the value from an EDS file. A boot-up restarts the supervision. The
-    supervision before a boot-up ends with the NMT reset of the node, or with the boot-up if no NMT
-    command has reset the node.
+    period is used, or otherwise the value from an EDS file. An NMT command that resets the node
+    ends the supervision. The boot-up starts a new supervision. If a boot-up arrives without such an
+    NMT command, the boot-up also ends the old supervision.
 
     Answers to node guarding requests, which have a toggle bit, do not count as heartbeats.
 

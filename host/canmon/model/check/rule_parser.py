@@ -487,8 +487,12 @@ def errors_alone(
     """Return the test of a filter, changed so that EMCYs with error code 0000h do not pass.
 
     A rule such as `emcy never` should match only errors, and such an EMCY reports that an error is
-    gone. The test is returned unchanged if the filter does not contain the word `emcy`, contains
-    `not`, or names a signal of the EMCY, as in `emcy and code = 0`.
+    gone.
+
+    The test is returned unchanged in these cases:
+    - The filter lacks the word `emcy`.
+    - The filter contains the word `not`.
+    - The filter names a signal of the EMCY, as in `emcy and code = 0`.
 
     Args:
         test: function that returns whether a frame passes the filter.

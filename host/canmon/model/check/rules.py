@@ -187,7 +187,8 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
 def joined(first: RuleValues, second: RuleValues) -> RuleValues:
     """Return the rules of two sets, such as those of a file and those of the command line.
 
-    Lists of both sets are joined. For other rules, the value of the second set replaces the first.
+    If the value of a rule is a list, the result contains the items of both lists. For other rules,
+    the value of the second set replaces that of the first set.
 
     >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
     {'known': ['181', '182'], 'max_load': 60}

@@ -57,7 +57,8 @@ def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
     The array is a lookup table: numpy can take the texts of many rows from it at once by index.
 
     Args:
-        texts: ASCII texts. None of them may be longer than an integer of the array in bytes.
+        texts: ASCII texts. A text may have at most as many characters as an integer of the array
+            has bytes.
         dtype: numpy data type of the integers, such as `<u4` for texts of up to four characters.
     """
     size = np.dtype(dtype).itemsize
@@ -299,18 +300,19 @@ class Scale(NamedTuple):
 
 
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
-    """Return the physical values of many integers as texts, as `str` writes floats.
+    """Return the physical values of many integers as texts.
 
-    The texts are calculated with integers. For some values, this calculation does not give the
-    right text, so the caller converts these values one by one.
+    A right text is the text that `str` gives for the value as a float. The calculation uses only
+    integers, so some texts are not right. The caller must convert these values one by one.
 
     Args:
         numbers: integers from the frames.
         scale: conversion of the integers to physical values.
 
     Returns:
-        The texts in parts, which are to be joined row by row: sign, digits before the decimal
-        point, point, and decimals. Also a mask that is True for each row with a right text.
+        The parts of the texts, and a mask. The parts are sign, digits before the decimal point,
+        point, and decimals. The caller joins them row by row. The mask is True for each row whose
+        text is right.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

@@ -698,8 +698,8 @@ class ColumnNodes:
     """Updates a node board from blocks of frames, with numpy, for `canmon nodes`.
 
     After the last block, the board has the same state as if the frames had been processed one by
-    one. The only exception is `NodeStatus.pdos`: it lacks PDOs that do not affect the other values
-    of the board. `canmon nodes` does not show `NodeStatus.pdos`.
+    one. The only exception is `NodeStatus.pdos`, which `canmon nodes` does not show: some PDOs are
+    missing there.
 
     Args:
         decoder: decoder for single frames. Its attribute `standard` must be True.
@@ -744,14 +744,14 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 class Exchanges(NamedTuple):
     """Pairs of an expedited SDO request and its answer, which add no knowledge about the node.
 
-    The block-wise survey may skip such pairs, for example when a master polls one object
-    repeatedly.
+    The survey of a log that is read in blocks may skip some of these pairs. They occur, for
+    example, when a master polls one object repeatedly.
 
     Attributes:
         requests: rows of the requests.
         answers: rows of the answers, in the same order.
-        inner: mask that is True for each pair if the SDO exchanges directly before and after it are
-            of the same node. Such a pair can be skipped without effect.
+        inner: mask with one value for each pair. The value is True if the previous and the next SDO
+            exchange are also pairs of this node. Such a pair can be skipped without effect.
     """
 
     requests: Ints
@@ -855,9 +855,9 @@ class Matter(NamedTuple):
     """Rows of a block whose frames must be decoded one by one, because they add knowledge.
 
     Attributes:
-        rows: all these rows: their frames can change what is known about nodes or CAN-IDs.
-        settling: those of `rows` whose frames can change the meaning of a CAN-ID, such as SDO
-            frames and boot-ups.
+        rows: all these rows. Their frames can change what is known about nodes or CAN-IDs.
+        settling: the part of `rows` with frames that can change the meaning of a CAN-ID, such as
+            SDO frames and boot-ups.
     """
 
     rows: Ints

@@ -156,7 +156,8 @@ def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
     """Return whether the decoder may learn something from the transferred value of an object.
 
     The decoder learns from the values of communication objects, such as COB-IDs and PDO mappings.
-    It also learns from the statusword until a value with 16 bits was seen.
+    It also learns from the first transfer of the statusword with 16 bits. Later transfers of the
+    statusword teach nothing.
 
     Args:
         entry: index and sub-index of the object.
@@ -211,9 +212,10 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: index in the block of frames, for each frame of the bus. The texts that are
-                written for the block have the same indices.
-            side: SDO channel, node-ID and direction of each frame.
+            places: row of each frame of the bus in the whole block. The text of the frame has the
+                same row.
+            side: for each frame of the bus, SDO channel, node-ID, and whether the client sent the
+                frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]

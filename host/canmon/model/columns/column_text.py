@@ -40,9 +40,9 @@ Intermediate results of these lines fit into the cache.
 
 
 def fits(columns: Columns) -> bool:
-    """Return whether the text of all frames can be written at once.
+    """Return whether all frames of a block can be converted to text together.
 
-    This requires bus names that consist of printable ASCII characters.
+    This is possible if all bus names consist of printable ASCII characters.
     """
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 

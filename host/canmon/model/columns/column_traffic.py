@@ -54,13 +54,13 @@ _STUFFED: Final = np.array(can.STUFFED, np.int64)
 def column_bits(
     ident: npt.NDArray[np.uint32], dlc: npt.NDArray[np.uint8], payload: npt.NDArray[np.uint64]
 ) -> _Ints:
-    """Return the number of bits of each frame on the bus, from which the load is calculated.
+    """Return how many bits each frame occupies on the bus. The bus load is calculated from them.
 
     Stuff bits and the interframe space are included.
 
     Args:
         ident: CAN-IDs with flags, as `ident_of` returns them.
-        dlc: data length code of each frame, also for remote frames.
+        dlc: data length code of each frame.
         payload: data of each frame as a little-endian number. Missing bytes are 0.
     """
     out = np.empty(len(ident), np.int64)
@@ -238,13 +238,11 @@ class _ColumnGaps:
 def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     """Return the histogram bucket numbers of several times, as `bucket_of` does for one time.
 
-    The time is converted to a floating-point number, whose exponent and first mantissa bits are the
-    number of the bucket. If a time is too long for an exact conversion, it is rounded down first,
-    so that it does not fall into the next bucket.
-
     Args:
         times_us: times in microseconds.
     """
+    # The exponent and the first mantissa bits of a float are its bucket. A time that is too long
+    # for an exact float is rounded down first, so that it does not fall into the next bucket.
     exact = np.where(times_us >> _MANTISSA_BITS, times_us & _COARSE, times_us)
     bits = exact.astype(np.float64).view(np.int64) >> _MANTISSA_BITS - SUB_BITS
     wide = bits - (_EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)

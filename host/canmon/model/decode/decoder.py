@@ -456,8 +456,8 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 def data_that_counts(route: Route) -> int:
     """Return a mask of the data bits that affect the meaning of the frames of a CAN-ID.
 
-    If frames are equal in these bits, they have the same meaning, so that only one of them must be
-    decoded. If the mask is 0, the number of data bytes does not affect the meaning either.
+    Frames with equal values of these bits have the same meaning, so only one of them must be
+    decoded. If the mask is 0, neither the data nor the number of data bytes affects the meaning.
 
     Args:
         route: function that decodes the frames of the CAN-ID.

@@ -220,8 +220,9 @@ class EdsFiles(dict[int, EdsObjects]):
     def find(self, channel: str, node: int, identity: EdsIdentity) -> EdsObjects | None:
         """Choose the EDS file for a node by its identity, and return the content of the file.
 
-        The result is None if no file fits or can be read, if the same file was already chosen, or
-        if the user has assigned a file to the node.
+        The result is None in these cases: no file fits, the file cannot be read, an earlier call
+        has already returned the same file for this node, or the user has assigned a file to the
+        node.
 
         Args:
             channel: name of the bus.

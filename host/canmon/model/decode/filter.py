@@ -349,8 +349,8 @@ class MissingSignals:
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
-        words: pairs of a field and a word, as in `Filter.words`: the filter compares the field with
-            the word, as in `kind=word`. Built-in decoders never set a field to one of these words.
+        words: pairs of a field and a word, from comparisons in filters such as `kind=word`. No
+            built-in decoder sets the field to the word, so the word may be misspelt.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -464,7 +464,7 @@ class FilterParser:
         text: text of the filter.
 
     Attributes:
-        words: words that were read and that no built-in decoder produces, as in `Filter.words`.
+        words: pairs of a field and a word, as in `Filter.words`, that were read until now.
     """
 
     wrong = FilterError
@@ -679,8 +679,9 @@ class Filter:
         matches: function that returns whether a frame passes the filter.
         signals: names of the signals in the filter, so that signals that never occur can be
             reported.
-        words: words in the filter that only the decoder of an installed package can produce, each
-            with its field.
+        words: pairs of a field and a word, from comparisons in the filter such as `kind=word`. Only
+            pairs are included in which no built-in decoder sets the field to the word. The decoder
+            of an installed package may do so.
     """
 
     text: str

@@ -93,8 +93,9 @@ class ObjectText(NamedTuple):
 
         Args:
             data: bytes that were transferred.
-            sized: whether the transfer indicated the number of bytes. If True, surplus bytes are
-                removed only if they are padding. If False, all surplus bytes are removed.
+            sized: whether the transfer indicated the number of bytes. If False, all surplus bytes
+                are removed. If True, the sender meant these bytes to be part of the value, so they
+                are removed only if they are padding.
         """
         kind = self.kind
         if kind is None or not 0 < kind.size < len(data):
@@ -586,9 +587,9 @@ class TwoBeats(NamedTuple):
 
     Attributes:
         period_us: period of each of the two heartbeats in microseconds.
-        places: indices of the gaps at which two heartbeats are visible: the gap between two
-            successive frames differs from the next gap, and the two gaps together last about one
-            period. Index n is the gap after frame n.
+        places: indices of the gaps that show that there are two heartbeats. Such a gap between two
+            frames differs from the next gap, and both gaps together last about one period. Index n
+            is the gap after frame n.
     """
 
     period_us: int

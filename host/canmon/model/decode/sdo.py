@@ -456,14 +456,14 @@ class SdoChannel:
     # A reader of blocks takes frames that fit at once, and all others by `request` and `response`.
 
     def turn(self) -> int:
-        """Return a code for the next request that would continue the running transfer.
+        """Return a code for the request that must come next in the running transfer.
 
         The block-wise decoder compares this code with the frames of a block.
 
         Returns:
-            0 if no transfer is running, 1 or 2 if an upload segment with toggle bit 0 or 1 must be
-            requested, 3 or 4 if a download segment with toggle bit 0 or 1 must be sent, and -1 in
-            any other case.
+            0 if no transfer is running. 1 or 2 if the next request must ask for an upload segment
+            with toggle bit 0 or 1. 3 or 4 if the next request must contain a download segment with
+            toggle bit 0 or 1. -1 if a transfer is running, but none of these requests is next.
         """
         running = self._running
         if running is None:
@@ -509,7 +509,7 @@ class SdoChannel:
         self._running = self._latest = None
 
     def block_from(self) -> TransferDirection | None:
-        """Return the direction of the block transfer whose segments are just being sent.
+        """Return the direction, upload or download, of the running block transfer.
 
         The result is None if no segments of a block are expected, or if the last segment has
         arrived.

@@ -139,7 +139,8 @@ class Curve:
         label: displayed name of the curve.
         axis: number of the vertical axis that the curve belongs to, from 1.
         unit: unit of the values.
-        stops: values of the curve in each column that has samples, from left to right.
+        stops: the columns of the picture that have samples, from left to right, each with the
+            values of the curve in this column.
     """
 
     label: str

@@ -183,8 +183,8 @@ class BlfBlock(NamedTuple):
     Attributes:
         rows: frames of the container, in the form that the parser of the container returns.
         frames: number of frames.
-        notes: offset, size and type of each BLF object in the container that reports errors instead
-            of a frame, such as a driver error.
+        notes: offset, size and type of each BLF object that contains no frame but reports an error,
+            such as a driver error.
         end: offset after the last complete object.
     """
 
@@ -406,10 +406,12 @@ class _AscWriter:
     def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
         """Write many frames at once, which takes 0.4 us for each frame. A single frame takes 6 us.
 
-        The result is False if this is not possible for the block, so that the caller must write its
-        frames one by one. The reasons are error frames, a frame from before the beginning of the
-        log, or of the block if the log is empty, and times that are not exact as floating-point
-        numbers.
+        The result is False if nothing was written. The caller must then write the frames of the
+        block one by one. There are three reasons:
+        - The block contains error frames.
+        - A frame of the block is earlier than the first frame of the log. In an empty log, the
+          first frame of the block will be the first frame of the log.
+        - A time is too long to be exact as a floating-point number.
         """
         first_us, earliest_us = block.first_us, block.earliest_us
         begin_us = self._begin_us
@@ -547,7 +549,8 @@ class _BlfWriter(can.BLFWriter):
     def flush(self) -> None:
         """Complete a container, so that it can be read even if the end of the log is missing.
 
-        The writer of python-can stores the start time of the log only at the end.
+        The start time of the log is also written, because the writer of python-can writes it only
+        at the end of the log.
         """
         self._flush()
         if not self._dated and self.start_timestamp is not None:

@@ -99,8 +99,8 @@ class ScreenClock:
             it counts from the first frame (`-t z`).
 
     Attributes:
-        shift_us: offset in microseconds, used if the time stamps come from the counter of a CAN
-            adapter. It is added to the counter, so that no time is below 0.
+        shift_us: offset in microseconds that `counted_us` adds to the time stamps of other logs,
+            which are counters of a CAN adapter. The offset prevents times below 0.
     """
 
     def __init__(self, deltas: bool = False) -> None:
@@ -637,7 +637,8 @@ _NUMBERLESS: Final = "canX"
 def bus_name(number: str) -> str:
     """Return the name of a bus for its number in a log, such as `can0` for the number 1.
 
-    For the number 0, the name is the text `canX`. A text that is not a number raises ValueError.
+    A number 0 means that the log does not tell the bus. The name is then literally `canX`. A text
+    that is not a number raises ValueError.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

@@ -30,8 +30,9 @@ class LogWriter(Protocol):
     def flush(self) -> None:
         """Pass all written items to the operating system.
 
-        They can then be read even if nothing follows. In a format that is written in blocks
-        (`in_blocks`), each call makes the file larger, so call it rarely.
+        Other programs can then read these items, even if the log is never closed. If the function
+        `in_blocks` returns True for the format, each call makes the file larger, so call the method
+        rarely.
         """
 
     def close(self) -> None:

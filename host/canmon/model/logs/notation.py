@@ -79,7 +79,7 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Return a message of a serial line as one line of JSON, in the form of an event.
+    """Return a message of a serial line as one line of JSON.
 
     `more` contains further members, each with a comma before it.
 
@@ -193,10 +193,10 @@ _DUMPED: Final = re.compile(
 def csv_row(record: Record) -> str:
     """Return a frame as a row of a CSV log, in the format of python-can with additions.
 
-    python-can's format does not contain the direction of a frame. Here, a `>` after the data marks
-    a frame that this program sent. base64 does not use `>`, and python-can ignores it. The format
-    does not contain CAN FD either. Here, a `#` after the data marks a CAN FD frame, `!` marks BRS,
-    and `*` marks ESI.
+    The format of python-can contains neither the direction of a frame nor CAN FD. In the rows of
+    this function, signs after the data mark them. The sign `>` marks a frame that this program
+    sent. python-can ignores this sign. The sign `#` marks a CAN FD frame, `!` marks BRS, and `*`
+    marks ESI.
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent
@@ -241,8 +241,9 @@ def gvret_row(record: Record, bus: int) -> str:
 def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
     """Parse a row of a CSV log, which python-can, `canmon dump --csv` or SavvyCAN wrote.
 
-    The row itself shows which of these formats it has. The result is a frame, a text for a header
-    or another counted item, or None for an invalid row.
+    The row itself shows which of these formats it has. For a row with a frame, the result is the
+    frame. For a header, or another item without a frame, the result is a text. For an invalid row,
+    the result is None.
     """
     if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
         return text

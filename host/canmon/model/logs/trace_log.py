@@ -30,8 +30,8 @@ _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 class TraceLogWriter:
     """Writer of a trace file of the test bench, with the frames of one bus as the host sees them.
 
-    The first frame determines the bus, and times count from it. Frames of other buses are counted,
-    but not written.
+    Only the bus of the first frame is written. Frames of other buses are only counted. All times in
+    the file count from the first frame.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

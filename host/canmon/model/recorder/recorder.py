@@ -154,8 +154,8 @@ class PreTrigger:
         span: amount of traffic to keep, as a number of frames or a time.
 
     Attributes:
-        short: whether the buffer holds less than the wanted time, because the frames of this time
-            were more than the buffer can hold.
+        short: whether too many frames arrived within the wanted time, so that the buffer could not
+            hold all of them.
     """
 
     def __init__(self, span: TriggerSpan) -> None:
@@ -337,7 +337,7 @@ class Recorder:
         The result is False if the caller must pass the frames to `take` one by one.
 
         Args:
-            block: block of at least one frame, with no event after the frames.
+            block: block of at least one frame.
             now_us: current time.
         """
         whole = self._before is None and self._wanted is None
