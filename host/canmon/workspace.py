@@ -506,9 +506,9 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 def below(*path: str | int) -> Iterator[None]:
     """Context manager for reading a nested table, so that errors name the full path of a setting.
 
-    If the block raises a SettingError, the path of the error is relative to the nested table. The
-    keys in `path`, which lead to the nested table, are put in front of it. Any other ValueError in
-    the block becomes a SettingError with the path `path`.
+    The argument `path` contains the keys that lead to the nested table. If the block raises a
+    SettingError, the context manager puts these keys in front of the path in the error. If the
+    block raises any other ValueError, it becomes a SettingError with these keys as its path.
     """
     try:
         yield

@@ -414,7 +414,7 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
 def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot | None:
     """Return the traffic statistics of a log that is read in blocks.
 
-    The result is None if no log can be read in this way, or the log must be read frame by frame.
+    The result is None if `log` is None, or if the log must be read frame by frame.
     """
     if log is None:
         return None

@@ -62,10 +62,10 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return a copy of a `LogCut` that also passes the frames before the part to the decoder.
+        """Let the decoder learn from the frames before the part of the log that `cut` selects.
 
-        The decoder learns from the frames before the selected part of the log. The command does not
-        print these frames.
+        The result is a copy of `cut` that passes these frames to the decoder. The command does not
+        print them.
         """
         if self._decoder is None or cut.begin is None:
             return cut
@@ -259,9 +259,9 @@ class StdoutWriter:
 
     If the format is JSON or a log, each event between frames is also a line.
 
-    Control characters in the text are replaced, so that they cannot affect a terminal. The log and
-    CSV formats are an exception: if standard output is not a terminal, their control characters are
-    kept, so that other programs receive the exact text.
+    Control characters in the text are replaced, so that they cannot affect a terminal. They are
+    kept in one case: the format is log or CSV, and standard output is not a terminal. Other
+    programs then receive the exact text.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:

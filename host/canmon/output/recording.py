@@ -132,10 +132,12 @@ class LogFile:
 
 @contextmanager
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
-    """Context manager that yields a path for a log, which replaces `path` when it is complete.
+    """Context manager that yields the path to which a log must be written.
 
-    If the source is not a file, the log is written to `path` directly, because writing may take
-    long and other programs may read the log during this time.
+    If the source consists only of files, the context manager yields the path of a temporary file.
+    At the end, this file gets the name `path`, so that `path` is always a complete log. For any
+    other source, such as a bus, the context manager yields `path`, because writing may take long
+    and other programs may read the log during this time.
 
     Raises:
         Refused: the name of the file indicates no format, or the file is being read.

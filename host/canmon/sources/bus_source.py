@@ -64,8 +64,8 @@ class SocketReader:
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
         tally: counts of items that are not frames.
-        stepped: whether virtual time passes only while the bus is read. It is False, because a
-            SocketCAN bus runs in real time.
+        stepped: always False, because a SocketCAN bus runs in real time. The readers of emulated
+            buses in virtual time have the value True.
     """
 
     stepped = False
@@ -272,11 +272,13 @@ class OpenBus:
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     """Combine the SOURCE word of a bus with the options of the command.
 
-    The word overrides the options.
+    If the word and an option both give the interface or a bit rate, the word has priority.
 
-    If the option `-i` names the interface, the whole word is the channel, even if it contains
-    colons. But if the word begins with the name of this interface and a colon, only the rest of the
-    word is the channel.
+    If the option `-i` gives the interface, the word gives only the channel:
+
+    - If the word begins with the name of this interface and a colon, the channel is the rest of the
+      word.
+    - Otherwise, the channel is the whole word, even if it contains colons.
 
     Raises:
         Refused: the word and -c name different channels.

@@ -62,7 +62,8 @@ class AnySource(Generic[_Taken_co]):
             already, as in a log.
         failed: reason why the source ended early, empty for none.
         marks: events after the frames that the last `poll` returned.
-        recorded: whether a recorder has already written the marks into a log and reported them.
+        recorded: whether the source is a log. The marks in a log were already reported when it was
+            recorded.
         buses: open buses of the source by name, on which frames can be sent.
     """
 
@@ -102,7 +103,7 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def unread(self) -> int:
-        """Number of lines and frames that arrived but were unreadable, such as noise and CAN FD."""
+        """Number of lines and frames that arrived but were not read, such as CAN XL frames."""
         return sum(tally.unread for _, tally in self.tallies())
 
     def poll(self, timeout_us: int, /) -> Sequence[_Taken_co]:
@@ -664,13 +665,12 @@ class PieceLog(_LoggedSource):
 def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
     """Open a log for reading in blocks of columns.
 
-    The result is None if the SOURCE words name something else, or if the log should be read frame
-    by frame.
+    The result is None if the SOURCE words do not name exactly one log, or if the log should be read
+    frame by frame.
 
     Args:
         words: SOURCE words.
-        cut: wanted part of the log. If the part passes earlier frames to a decoder, the result is
-            None.
+        cut: wanted part of the log. If its attribute `earlier` is set, the result is None.
 
     Raises:
         Refused: the words do not name a source.

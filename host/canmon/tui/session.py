@@ -272,7 +272,7 @@ class Session:
         return self._thread is not None
 
     def over(self, model: Model) -> Session:
-        """Return a new session that continues to read the same source, but with a new model.
+        """Return a new session that passes the frames of the same source to a new model.
 
         It is used when the user changes the EDS or DBC files while the source is running. Close the
         present session before you use the new one.

@@ -102,8 +102,8 @@ class _FindingPrinter:
     def count(self, frames: int, first_us: int) -> None:
         """Count checked frames.
 
-        If findings are displayed with their times since the first frame, the first call sets the
-        time of this frame.
+        If findings are displayed with times since the first frame, the first call sets the time
+        from which they count.
 
         Args:
             frames: frames to count. There is at least one frame.

@@ -41,10 +41,11 @@ class Layout(NamedTuple):
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of options, master and slaves in a bus.yml.
 
-    In a file for dcfgen, a top-level key that begins with a dot is not a node, because its value
-    only defines YAML anchors. A file for cogen has a section `nodes` or `defaults`. Such a file is
-    read as cogen converts it for dcfgen: the keys in `defaults` replace the same keys of each node,
-    and then all keys are sorted.
+    A bus.yml is written for one of two programs. In a file for dcfgen, a top-level key that begins
+    with a dot is not a node, because its value only defines YAML anchors. A file with a section
+    `nodes` or `defaults` is for cogen, which converts it to a file for dcfgen. This function does
+    the same conversion: the keys in `defaults` replace the same keys of each node, and then all
+    keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)

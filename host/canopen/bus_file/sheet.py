@@ -116,12 +116,12 @@ class Sheets:
     def find(self, node: BusFileSection) -> Sheet | None:
         """Find and read the EDS or DCF of a node.
 
-        If no file is found, a finding is reported and the result is None. The file is searched in
-        this order:
+        If no file is found, a finding is reported and the result is None. The node gives the path
+        of the file, which may contain folders. The file is searched in this order:
 
-        - in the folder of the bus.yml, as in dcfgen
-        - in `dcf_path`
-        - in the folder of the bus.yml and in its parent folder, by the file name without folders,
+        - path of the file, relative to the folder of the bus.yml, as in dcfgen
+        - path of the file, relative to `dcf_path`
+        - only the name of the file, in the folder of the bus.yml and then in its parent folder,
           because the folder `dcf_path` may exist only in a container
         """
         name = node.text("dcf")

@@ -93,9 +93,8 @@ def writes(
     Args:
         values: wanted value of each object, by index and sub-index.
         number: function that reads an object of the node as an unsigned number.
-        writable: objects that the host can write. The order may need additional writes, such as one
-            that disables a PDO for a time. Additional writes to objects that are not in this
-            collection are left out.
+        writable: objects that the host can write. Writes to other objects are left out, also those
+            that only the order needs, such as a write that disables a PDO for a time.
 
     Raises:
         ValueError: a COB-ID or a number of mapped objects is invalid.

@@ -70,12 +70,12 @@ class LssMaster:
     Args:
         bus: bus to which the slaves are connected.
         answer_us: time to wait for the answer to a command, in microseconds.
-        scan_us: time to wait for answers to each of the 133 requests of a fastscan, in
-            microseconds.
+        scan_us: time to wait for answers to one request of a fastscan, in microseconds. A fastscan
+            sends 133 requests.
 
     Attributes:
-        waiting: whether `at_work` has ended and has switched all slaves back to the LSS state
-            `waiting`.
+        waiting: whether the LSS master has finished its work (method `at_work`) and has then
+            switched all slaves to the LSS state waiting.
     """
 
     def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:

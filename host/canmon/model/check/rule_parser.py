@@ -490,6 +490,7 @@ def errors_alone(
     gone.
 
     The test is returned unchanged in these cases:
+
     - The filter lacks the word `emcy`.
     - The filter contains the word `not`.
     - The filter names a signal of the EMCY, as in `emcy and code = 0`.

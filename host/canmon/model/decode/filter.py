@@ -680,8 +680,8 @@ class Filter:
         signals: names of the signals in the filter, so that signals that never occur can be
             reported.
         words: pairs of a field and a word, from comparisons in the filter such as `kind=word`. Only
-            pairs are included in which no built-in decoder sets the field to the word. The decoder
-            of an installed package may do so.
+            pairs are included in which no built-in decoder sets the field to the word. Only the
+            decoder of an installed package can do this.
     """
 
     text: str

@@ -94,8 +94,8 @@ class ObjectText(NamedTuple):
         Args:
             data: bytes that were transferred.
             sized: whether the transfer indicated the number of bytes. If False, all surplus bytes
-                are removed. If True, the sender meant these bytes to be part of the value, so they
-                are removed only if they are padding.
+                are removed. If True, surplus bytes are removed only if they are padding, because
+                any other bytes may belong to the value.
         """
         kind = self.kind
         if kind is None or not 0 < kind.size < len(data):

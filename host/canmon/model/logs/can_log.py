@@ -408,6 +408,7 @@ class _AscWriter:
 
         The result is False if nothing was written. The caller must then write the frames of the
         block one by one. There are three reasons:
+
         - The block contains error frames.
         - A frame of the block is earlier than the first frame of the log. In an empty log, the
           first frame of the block will be the first frame of the log.

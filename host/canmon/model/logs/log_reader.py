@@ -637,8 +637,7 @@ _NUMBERLESS: Final = "canX"
 def bus_name(number: str) -> str:
     """Return the name of a bus for its number in a log, such as `can0` for the number 1.
 
-    A number 0 means that the log does not tell the bus. The name is then literally `canX`. A text
-    that is not a number raises ValueError.
+    For the number 0, the name is literally `canX`. A text that is not a number raises ValueError.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

@@ -30,9 +30,9 @@ class LogWriter(Protocol):
     def flush(self) -> None:
         """Pass all written items to the operating system.
 
-        Other programs can then read these items, even if the log is never closed. If the function
-        `in_blocks` returns True for the format, each call makes the file larger, so call the method
-        rarely.
+        Other programs can then read these items, even if the log is never closed. If the log is
+        compressed block by block (function `in_blocks`), each call makes the file larger, so call
+        the method rarely.
         """
 
     def close(self) -> None:

@@ -69,7 +69,8 @@ class EdsClaims(NamedTuple):
 
     Attributes:
         lss: whether the node supports LSS.
-        dummies: names of the features for the dummy objects that the node allows in a PDO mapping.
+        dummies: dummy objects that the node allows in a PDO mapping, by their names in checks, such
+            as `dummy5`.
         identity: vendor-ID, product code and revision number of the identity object 1018h, by
             sub-index. They come from the section DeviceInfo of the EDS, and numbers that are
             missing there are left out.
@@ -118,9 +119,8 @@ class NodeDescription(NamedTuple):
     ) -> NodeDescription:
         """Make the description of an emulated node from its object table, without writing an EDS.
 
-        The result is the same as if the objects had been written to an EDS, and the EDS had been
-        read. In such an EDS, the default value of each numeric object is its value at power-on. An
-        object whose value is an empty text has no default value.
+        The default value of each numeric object is its value at power-on. An object whose value is
+        an empty text has no default value.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]

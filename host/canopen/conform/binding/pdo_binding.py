@@ -150,7 +150,8 @@ def bind_pdos(
     """Find one PDO of the node for each PDO name in conformance checks.
 
     The name `mapped_rpdo` stands for an RPDO whose mapped objects may all be written. Checks may
-    send data to this RPDO at once. For each other RPDO, checks must change the mapping first.
+    send data to this RPDO without changing its mapping. Before checks send data to any other RPDO,
+    they must change its mapping.
 
     Args:
         device: device that the EDS describes.

@@ -98,11 +98,11 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the objects of a node that fit this name in checks, in the given order.
+        """Return the objects of a node that can take the place of this name, in the given order.
 
         A check contains the name in place of an index and sub-index. The run replaces the name by
-        one of these objects. If the checks write to the object, the result contains no
-        communication object whose values CiA 301 limits further.
+        one of these objects. If the checks write to the object, a communication object is left out
+        if CiA 301 does not allow all values between its limits.
         """
         # One loop without function calls, which took a tenth of the time of a single check.
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE

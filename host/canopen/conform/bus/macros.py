@@ -151,7 +151,7 @@ def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def room(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Start and abort an SDO download, to find out whether an object can hold a value of this size.
+    """Start and abort an SDO download, to find out whether an object can hold `size` bytes.
 
     This is needed because an EDS does not state the maximum length of a string.
 
@@ -300,12 +300,13 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     """Request node guarding several times, and check the reported NMT states and the toggle bit.
 
     Args:
-        sdo: SDO frames of the node, used for access to the bus.
+        sdo: SDO frames of the node, which give access to the bus.
         can_id: CAN-ID of the node's error control messages.
         words: expected NMT states in hex, one per request, such as `7F`. In the first answer, the
-            toggle bit may be 0 or 1, and must then alternate. With the prefix `=`, as in `=7F`, the
-            toggle bit must be 0. A word that contains # is not a state but a frame, which is sent
-            before the next request.
+            toggle bit may be 0 or 1. In each later answer, the toggle bit must have changed. If a
+            state has the prefix `=`, as in `=7F`, the toggle bit must be 0 in the answer to its
+            request. A word that contains # is not a state but a frame, which is sent before the
+            next request.
     """
     toggle: int | None = None
     for word in words:
