@@ -61,8 +61,9 @@ class TimeBins(Generic[_Key]):
 
     Attributes:
         width_us: present width of a span in microseconds.
-        sums: for each key, the sums of the amounts by number of the span.
-        ranges: for each key, the least and greatest values by number of the span.
+        sums: sums of the amounts. The outer dictionary has the keys, the inner dictionaries have
+            the numbers of the spans.
+        ranges: least and greatest value in each span, in dictionaries with the same structure.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:

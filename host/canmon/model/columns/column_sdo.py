@@ -214,8 +214,8 @@ class _Frames(NamedTuple):
             rows: rows of the SDO frames.
             places: row of each frame of the bus in the whole block. The text of the frame has the
                 same row.
-            side: for each frame of the bus, SDO channel, node-ID, and whether the client sent the
-                frame.
+            side: sender and receiver of each frame of the bus: SDO channel, node-ID, and whether
+                the client sent the frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]
