@@ -205,15 +205,14 @@ class Unanswered(list[Object]):
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
-        """Return an object to read in order to wait for late answers about object `at`.
+        """Return an object to read next, so that late answers about object `at` can be recognized.
 
-        The server answers in order. The answer about the returned object therefore comes after all
-        late answers about `at`.
+        The server answers in order. When it answers the read of the returned object, it will send
+        no more late answers about `at`.
 
-        All objects of `FENCES` except `at` are suitable. If the object of the latest request is
-        suitable, this object is returned again, so that a node that is gone gets repeated requests
-        for the same object. If all suitable objects have unanswered requests, the oldest request is
-        dropped.
+        The result is an object of `FENCES`, but not `at`. If the latest request was for such an
+        object, that object is returned again. Otherwise, an object without an unanswered request is
+        returned. If there is none, the oldest requests are forgotten until there is one.
         """
         last = self[-1]
         if last in FENCES and last != at:

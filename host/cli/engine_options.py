@@ -73,8 +73,7 @@ def format_name(pattern: str, values: Mapping[str, str]) -> str:
 
     Args:
         pattern: format of OpenRTM such as `%h.host_cxt/%n.rtc`. `%%` is a percent sign.
-        values: texts that replace the percent signs and letters, by letter. The text for `n`
-            replaces `%n`.
+        values: text for each letter. The text for `n` replaces `%n`.
 
     >>> format_name("%h.host_cxt/%n.rtc", {"h": "robot", "n": "ConsoleIn0"})
     'robot.host_cxt/ConsoleIn0.rtc'
@@ -169,12 +168,12 @@ class EngineOptions:
 
 
 def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
-    """Move the options of OpenRTM and ROS 2 out of the options of a command. Return their settings.
+    """Return the settings of OpenRTM and ROS 2 that the options of a command contain.
 
     Args:
-        options: options of the command line by name.
-        topics: default table of the command, as text. The table assigns topics of ROS 2 to ports.
-            If the text is empty, each port has a topic.
+        options: options of the command line by name. The options of OpenRTM and ROS 2 are removed.
+        topics: text of the table that assigns ROS 2 topics to ports if the user names no table. If
+            it is empty, each port has a topic.
 
     Raises:
         Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 but the user did not

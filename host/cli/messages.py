@@ -48,9 +48,9 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Context manager that turns errors of its block into a ClickException (exit status 1).
 
-    An error may have an attribute `status`, the exit status of a process that the command started.
-    If this status is 3, the exit status of SourceFailed, the error becomes SourceFailed instead.
-    Errors in writing standard output are not changed.
+    An error of a process that the command started may have an attribute `status`, the exit status
+    of that process. If `status` is 3, the error becomes SourceFailed, so the command also ends with
+    exit status 3. Errors in writing standard output are not changed.
     """
     try:
         yield
@@ -73,14 +73,13 @@ def refusing(
 ) -> Iterator[None]:
     """Context manager that turns errors of its block into Refused, which ends the command.
 
-    For an OSError, the message contains the path and the reason of the error, as in `refuse_path`.
+    The message consists of `what`, `path` if it is not None, and the text of the error. For an
+    OSError, it consists of `what`, the path in the error, and the reason.
 
     Args:
-        what: beginning of the message: the invalid option or argument.
-        wrong: class of the errors to turn into Refused. The message ends with the text of the
-            error.
-        path: file that contains the error. It is named in the message before the text of the error.
-            None if that text already names the file.
+        what: invalid option or argument.
+        wrong: class of the errors to turn into Refused. Each OSError is turned into Refused too.
+        path: file that contains the error. Use None if the text of the error names the file.
     """
     try:
         yield

@@ -60,11 +60,11 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 def refuse_idle(why: str, *names: str) -> None:
-    """Refuse the current command if the user gave one of some options, because it has no effect.
+    """Refuse the current command if the user gave an option that has no effect.
 
     Args:
         why: reason why the options have no effect, such as `--jsonl has its own times`.
-        names: parameter names of these options.
+        names: parameter names of the options that have no effect.
     """
     from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
 

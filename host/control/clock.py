@@ -22,8 +22,7 @@ class RealClock:
     def wait_until(self, t_us: int, /) -> int:
         """Sleep until a time.
 
-        If the time has passed already, the method returns at once, so that a late rig catches up
-        without skipping ticks.
+        If the time has passed already, the method returns at once.
 
         Args:
             t_us: time in microseconds since the first wait.

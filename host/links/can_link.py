@@ -295,14 +295,17 @@ class BusReceiver:
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
-        """Return the next python-can message, or None if none arrives in time or it is invalid.
+        """Return the next python-can message.
+
+        The result is None if no message arrives in time, or if 16 reads in a row fail. A read fails
+        if the driver raises an error or the message is not a valid frame.
 
         Args:
             timeout_s: longest wait in seconds, or None to wait without limit.
 
         Raises:
-            LinkClosed: the connection to the bus is lost, or 100 reads in a row have failed during
-                1 s.
+            LinkClosed: the connection to the bus is lost, or all reads have failed for 1 s or
+                longer, and these were at least 100 reads.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
         for _ in range(_TRIES):
@@ -506,9 +509,9 @@ class CanLink:
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for the next frame, then return all received frames with their arrival times.
 
-        The returned time is the time just before the last poll of the bus. The process may be
-        suspended after this poll. If the caller uses the returned time as the present time, it does
-        not count nodes as silent during the suspension.
+        The returned time is the time just before the last poll of the bus. Use it as the present
+        time when you check whether a node is silent. The clock may be far ahead, because the
+        operating system may suspend the process after the poll.
 
         Args:
             timeout_us: longest wait in microseconds. 0 does not wait.

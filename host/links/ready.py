@@ -136,7 +136,7 @@ _T = TypeVar("_T")
 class WaitingQueue(Generic[_T]):
     """Queue from which one thread reads and to which any threads write, safe against signals.
 
-    A signal cannot block this queue. It can block the queues of Python: after a signal,
+    A signal cannot block this queue. The queues of Python may block: after a signal,
     `queue.SimpleQueue` (CPython 3.11) may wait without end although it has a timeout, and
     `queue.Queue` may keep a lock acquired.
     """

@@ -148,7 +148,8 @@ class RrcLoad:
         load_pct: load in per cent: 30 % for the RRC's own work, plus the load that the lines cause.
         margin_pct: remaining capacity in per cent, 100 minus `load_pct`. The client keeps at least
             10 % free.
-        pace_lines_s: maximum number of lines per second without waiting for answers.
+        pace_lines_s: maximum number of lines per second that the client sends if it does not wait
+            for answers.
     """
 
     load_pct: int

@@ -153,7 +153,7 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time until which the RRC may still answer commands from before its restart, in us.
+        """Time in us until which the RRC may answer commands that were sent before its restart.
 
         The time is 0 if no such command waits for an answer.
         """
@@ -170,10 +170,14 @@ class _UnconfirmedCommands:
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Process an OK: remove the oldest waiting command of a name, and return the newest one.
+        """Process an OK to a command with this name.
 
-        The OK confirms the oldest waiting command of the name. The RRC executes the newest command
-        last, so its values will apply. If no command of the name is waiting, the result is None.
+        Several commands with the same name may wait for an answer. The OK confirms the oldest one,
+        which is removed.
+
+        Returns:
+            The newest of these commands, because its values will apply. None if no command with
+            this name is waiting.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:

@@ -154,9 +154,7 @@ class ComponentAction:
         return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period while the component is in the Error state.
-
-        The period is one of the execution context `ec`.
+        """Do the work of a period of `ec` while the component is in the Error state.
 
         The return value is ignored.
         """
@@ -478,8 +476,8 @@ class ExecutionContexts:
     time.
 
     Attributes:
-        quiet_us: time in us of the latest tick in which no context was due. In such a tick, the
-            contexts are not called, so they use this time as their `now_us`.
+        quiet_us: time in us of the latest tick in which no context was due. The contexts are not
+            called in such a tick. They read their present time `now_us` from here.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")

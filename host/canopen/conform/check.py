@@ -194,9 +194,12 @@ class Hold(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRewrite(OfObject):
-    """Step that reads an object and writes its value back, with `grow` more bytes.
+    """Step that reads an object and writes its value back. The node must refuse the write.
 
-    This value is too long, so the node must refuse the value with one of the given SDO abort codes.
+    Attributes:
+        grow: number of bytes that are added to the value. A negative number removes bytes from its
+            end. 0 does not change the value.
+        codes: SDO abort codes with which the node may refuse the write.
     """
 
     grow: int

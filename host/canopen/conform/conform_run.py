@@ -109,11 +109,10 @@ class _StrayHeartbeat:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Report after the run if a heartbeat that 1017h does not enable has stopped.
+        """After the run, check whether the node still sends the heartbeat that it sent before.
 
-        Some nodes send a heartbeat before the run although their object 1017h does not enable one.
-        If such a heartbeat is missing after the run, the heartbeat is reported as not restored,
-        because the tester cannot switch it on again.
+        Only a heartbeat that object 1017h does not enable is checked. The tester cannot switch on
+        such a heartbeat. If it is missing now, `unrestored` becomes a text that reports it.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:

@@ -123,7 +123,7 @@ class Judge:
 
     Args:
         plan: options of the run, such as its level.
-        exchange: bus with the node.
+        exchange: connection to the bus of the node.
         player: player that executes the steps of a check.
         care: helper that restores the node after each check.
         permission: rules that decide which objects may be written.

@@ -138,7 +138,7 @@ class KnownState:
         self._write_back(self._begin, [at for at in addresses if at in self._begin])
 
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
-        """Restore the objects that a reset has changed to the values with which each check begins.
+        """After a reset, give the changed objects the values with which each check begins.
 
         There are several kinds of resets, such as NMT reset communication. After the first reset of
         a kind, the tester reads all objects, and records the objects that this kind of reset

@@ -73,11 +73,13 @@ class _Names(Protocol):
     def text(self, name: str, attribute: str, /) -> str:
         """Return the text that replaces `$name.attribute` in a check.
 
-        The text is in hex, in the byte order of the bus. For the attributes `new` and `other` of an
-        object, the text is a value that a check may write to the object. Both values differ. For
-        `old`, the text is the value before the run. For `map`, the text is the entry by which a PDO
-        mapping contains the object. If the attribute is empty, the text is the multiplexer of the
-        object (index and sub-index).
+        The text is in hex, in the byte order of the bus. If the name stands for an object, the
+        attributes mean:
+
+        - `new` and `other`: two different values that a check may write to the object;
+        - `old`: the value of the object before the run;
+        - `map`: the PDO mapping entry for the object (index, sub-index and length);
+        - empty: index and sub-index of the object.
 
         Raises:
             Unbound: the node has no object or value for this name.
@@ -242,10 +244,10 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return the beginning of the message that a step has failed: the text of this step.
+    """Return a step as text, for the beginning of the message that the step has failed.
 
     The text does not contain the expected abort codes. For a step about frames, the text is empty,
-    because the failure message contains the expected frames.
+    because the message contains the expected frames.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():

@@ -349,9 +349,8 @@ class Subject:
     def missing(self, bound: BoundCheck) -> str | None:
         """Return the reason why a missing object prevents a check, or None if no object is missing.
 
-        For each mandatory object, one check fails if the node lacks the object, such as UE-01 for
-        1000h. All other checks that need the object are not applied, and the reason is the result
-        of this method.
+        If the node lacks a mandatory object, only one check fails. For the object 1000h, this is
+        the check UE-01. Other checks that need the object get a reason here. They are not executed.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
@@ -362,10 +361,10 @@ class Subject:
         return None
 
     def fixed(self, steps: Collection[check.Step]) -> str | None:
-        """Return the reason why a write step cannot be executed, or None if all write steps can.
+        """Return why one of the steps of a check cannot be executed, or None if all steps can.
 
-        The reason is an object that the node does not let the host change. CiA 301 allows some
-        objects to be constant.
+        A step cannot be executed if it writes an object that is read-only, or a value outside the
+        limits of the object.
         """
         for step in steps:
             for at in _takes(step):

@@ -36,8 +36,8 @@ class FrameLine(NamedTuple):
 
     Attributes:
         at_us: bus time since the start of the run, in microseconds.
-        direction: direction of the frame, to the node or from the bus, or the information that the
-            line is a remark.
+        direction: `SENT` for a frame that the tester sent, `RECEIVED` for a frame that the tester
+            received, or `REMARK` for a remark.
         text: frame in candump notation, or the text of the remark.
     """
 

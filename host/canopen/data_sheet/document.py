@@ -75,10 +75,10 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return a text that lists the letters that the first non-ASCII byte of a line may mean.
+        """Return a text about the first non-ASCII byte of a line, as part of a finding.
 
-        The text is part of a finding. An EDS does not name its encoding, and the byte means another
-        letter in each possible encoding.
+        An EDS does not name its encoding. The text lists the possible encodings, and the letter
+        that the byte stands for in each of them.
         """
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
@@ -115,8 +115,8 @@ class Document:
             rule: name of the violated rule.
             text: invalid value, and the allowed values.
             section: title of the section, empty for the file as a whole.
-            line: line number, or a keyword whose line is meant. By default, it is the first line of
-                the section.
+            line: number of the line, or the keyword in the line. By default, the finding is about
+                the first line of the section.
             edits: edits of the file that correct the violation.
         """
         number = line if isinstance(line, int) else self.file.line(section, line)

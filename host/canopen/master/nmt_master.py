@@ -22,7 +22,9 @@ from tickrig.wire.instant import NEVER
 
 
 class ProcessData:
-    """Process data of all slaves, to which the master gives the received frames and the SYNCs.
+    """Process data (PDOs) of all slaves.
+
+    The master passes the received frames and the SYNCs to this object.
 
     Args:
         images: process image of each slave, by node-ID.

@@ -158,9 +158,8 @@ class PdoLinks:
     def make(self, now_us: int, node_id: int) -> None:
         """Make the PDO links of a node that has just become ready.
 
-        A link is stored in the target, as the COB-ID of its RPDO. If the node is only the source of
-        a link, and the target was not reset, the link therefore still exists. Such a link is not
-        made again.
+        A link is stored in the target node, as the COB-ID of an RPDO. When the source node is
+        reset, the target keeps the link. So the link is not made again.
         """
         for link in self.links:
             if link.target.node == node_id:

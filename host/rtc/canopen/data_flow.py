@@ -58,9 +58,9 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Call `route` now, and whenever an InPort of a node's proxy gets or loses a connector.
+        """Keep the tables of `route` up to date for a new proxy.
 
-        This method is called for each new proxy.
+        The tables are rebuilt now, and whenever an InPort of the proxy gets or loses a connector.
         """
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:
@@ -123,9 +123,8 @@ class SdoDataFlow:
 
     Objects are read for OutPorts of the proxies, and values at InPorts are written to objects.
     Values are transferred while the proxy is Active and its device is Operational. For each port,
-    at most one value is transferred per period. The transfer of the values of all waiting ports of
-    a proxy is one job. When a job has ended, the next job of the same proxy begins in the next
-    period.
+    at most one value is transferred per period. If the transfers of a proxy take longer than a
+    period, the next ones begin in the first period after their end.
 
     Args:
         nodes: nodes by node-ID.
@@ -156,11 +155,12 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Schedule a value that an InPort gets from the caller instead of a connector.
+        """Give an InPort a value without a connector. The device gets the value in the next period.
 
-        The value is written to the device in the next period.
-
-        Return the result, or None if the port is unknown.
+        Returns:
+            RTC_OK if the value was accepted, BAD_PARAMETER if it does not fit the object,
+            PRECONDITION_NOT_MET while the device has not reported Operational, or None if there is
+            no such InPort.
         """
         for node in self._nodes.values():
             for sink in node.proxy.sdo_sinks if node.proxy else ():

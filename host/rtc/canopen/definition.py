@@ -149,8 +149,8 @@ class SdoPortEntry:
     Attributes:
         index: index of the object. All elements of an array are one value.
         direction: `out` if the object is read for the port, `in` if it is written from the port.
-        type: name of the type of the port, or None for the default type for the object's data type
-            in the EDS.
+        type: name of the data type of the port. With None, the type follows from the data type of
+            the object in the EDS.
     """
 
     index: int

@@ -67,15 +67,16 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | 
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Check a System Definition without a bus.
 
-    Return a text for each setting that a node will refuse.
-
-    The check assumes that the nodes match their EDS. There is also a text for each COB-ID with
-    which several nodes send a PDO, although no node refuses this. Nodes whose EDS lacks values are
-    not checked. Components that do not exist are not checked either.
+    The check assumes that the nodes match their EDS. It does not check nodes whose EDS lacks
+    values, or components that do not exist.
 
     Args:
         server: server that has the System Definition. The check adds proxies to it although there
             are no devices. Afterwards, do not use this server for anything else.
+
+    Returns:
+        A text for each setting that a node will refuse, and a text for each COB-ID with which
+        several nodes send a PDO.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():

@@ -248,7 +248,8 @@ class NodeOperations:
     def follow(self, state: NmtState, *, changed: bool) -> None:
         """Move the proxy to the state that its device reported.
 
-        The proxy stays as it is while a request is waiting or running that will change the state.
+        While a request that changes the NMT state of the device is waiting or running, the proxy
+        keeps its state.
 
         Args:
             state: NMT state that the device reported.
@@ -311,8 +312,8 @@ class NodeOperations:
         Return False if no restart is left.
 
         Args:
-            to_start: whether the node will be activated anyway, even without this restart. If so,
-                it is not reported that no restart is left.
+            to_start: whether the server will activate the node in any case. If not, and no restart
+                is left, an event tells the user to reset or activate the node.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

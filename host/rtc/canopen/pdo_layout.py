@@ -111,9 +111,10 @@ PARAMETERS = 0x200
 
 
 def proxy_index(index: int) -> int:
-    """Convert the index of a PDO parameter of a device to the index in its proxy.
+    """Return the index of the proxy's PDO parameter that belongs to a PDO parameter of the device.
 
-    A TPDO of the device is an RPDO of the proxy, and vice versa.
+    The proxy receives each PDO that the device sends, and vice versa. So each TPDO of the device
+    is an RPDO of the proxy.
 
     >>> f"{proxy_index(0x1801):04X}h {proxy_index(0x1A01):04X}h {proxy_index(0x1400):04X}h"
     '1401h 1601h 1800h'

@@ -57,8 +57,9 @@ class PdoView:
         name: name of the PDO, such as `16.tpdo2`.
         cob_id: CAN-ID of the PDO. For a linked RPDO, it is the CAN-ID of the source.
         bits: length of the PDO in bits.
-        index: index of the communication parameter in the device.
-        proxy_index: index of the communication parameter in the proxy.
+        index: index of the PDO communication parameter in the device, such as 1800h.
+        proxy_index: index of the opposite PDO in the proxy. For TPDO 1800h of the device, it is
+            RPDO 1400h.
     """
 
     name: PdoName

@@ -184,9 +184,9 @@ class _ArrivalBuffer(RingBuffer[P]):
         Any thread may call.
 
         Returns:
-            The status that `write` would return, and whether the value is now the only one that
-            waits for the thread. If so, the caller must make the thread move the values into the
-            buffer.
+            The first value is the status that `write` would return. The second value is whether the
+            caller must make the manager's thread call `let_in`. This is so if no other value was
+            waiting.
         """
         options = self._options
         with self._lock:
@@ -513,11 +513,13 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     def write(self, value: T) -> PortStatus:
         """Encode a value that the OutPort writes, and put it into the buffer of values to send.
 
+        The value is sent later.
+
         Returns:
             INVALID_ARGS if the value cannot be encoded, or the status of the buffer if the buffer
-            does not accept the value. Otherwise, the value is sent later, so the result is about
-            the previous value that was sent. It is the status that the other process returned, such
-            as PORT_OK or BUFFER_FULL, or CONNECTION_LOST if the process did not answer.
+            does not accept the value. Otherwise, the result of the latest value that was sent. This
+            is the status that the other process returned, such as PORT_OK or BUFFER_FULL, or
+            CONNECTION_LOST if the other process did not answer.
         """
         try:
             payload = self._codec.encode(value)

@@ -51,7 +51,8 @@ class _Adapter(RtComponent, Generic[S, T]):
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
     """Component that converts velocity commands from phase 1 to phase 2 of the IIS interfaces.
 
-    IIS are the common interfaces of mobile robots, which exist in three phases.
+    IIS are the common interfaces of mobile robots. They exist in three phases. Each phase has its
+    own data types.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
@@ -118,7 +119,10 @@ class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
-        """Return the position in phase 2, heading in 0..2 pi, or None if a number is invalid."""
+        """Return the position in the form of phase 2, or None if a number is invalid.
+
+        The heading of the result is in 0..2 pi.
+        """
         if (pose := ports.to_pose(value.data)) is None:
             return None
         numbers = (pose.x, pose.y, positive(pose.heading))

@@ -126,7 +126,7 @@ def keys_of(section: str) -> dict[str, str] | None:
 def numbered(section: str, key: str) -> str | None:
     """Return the correct spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`.
 
-    The result is None if the section has no such keywords.
+    The result is None if a section with this title cannot have such a keyword.
 
     >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
     ('Line5', 'Dummy001B', None)

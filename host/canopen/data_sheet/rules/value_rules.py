@@ -66,10 +66,9 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
-    """Return the data type of the number in a line that gives a value of an object.
+    """Return the data type of the object to which a line such as `DefaultValue=5` gives a value.
 
-    An example is the line `DefaultValue=5`. For other lines, and for values that are not numbers,
-    the result is None.
+    The result is None if the line gives no value to an object, or if the data type is not a number.
     """
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = eds_value.object_section(line.section)

@@ -42,7 +42,8 @@ class DriveSettings:
     """Settings of one drive axis, as in the bus.yml.
 
     Attributes:
-        channel: name of the joint, and scales and offsets of its values.
+        channel: settings of the joint that the axis moves, such as its name and the scales that
+            convert its values.
         axis: number of the axis. 0 is the first axis of the device.
         switching_state: CiA 402 state to which the drive is switched before its mode of operation
             is changed.
@@ -112,8 +113,8 @@ async def home(
         name: name of the joint, for messages.
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
-        caught_up: function that waits until the drive, after receiving the latest controlword, has
-            sent a statusword. It returns an operation to await.
+        caught_up: function that returns an operation to await. The operation ends when the drive
+            has received the latest controlword and then sent a statusword.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
@@ -467,7 +468,7 @@ class DriveNode:
     period are still running.
 
     Args:
-        slave: slave that represents the node at the master.
+        slave: object of the master that communicates with the node.
         image: values of the PDOs of the node.
         axes: settings of each axis.
         period_us: period in microseconds. 0 stands for once per SYNC.

@@ -66,7 +66,8 @@ class DriveObject:
     """Object of the drive profile CiA 402, such as the target position, with its size and sign.
 
     Attributes:
-        index: index of the object of the first axis.
+        index: index of the object for the first axis of the device. For each further axis, the
+            index is 800h higher.
         size: size of the value in bytes.
         sub: sub-index of the object.
         signed: whether the data type of the object is a signed INTEGER.

@@ -78,10 +78,12 @@ _ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
 
 
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
-    """Return the state to which a drive must switch next on its way to a wanted state.
+    """Return the state to which a drive must switch next.
 
-    If the wanted state is Operation enabled, the result is the next state on the way. If another
-    state is wanted, the result is that state.
+    Args:
+        state: present state of the drive, or None if it is unknown.
+        goal: state that the drive is to reach in the end. For Operation enabled, the result is the
+            next state on the way. For every other goal, the result is the goal.
     """
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 

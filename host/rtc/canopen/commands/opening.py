@@ -169,9 +169,9 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Yield a function that writes server events to the log file.
+    """Open the log file, and yield the function that writes a server event to it.
 
-    Without a log file, the iterator is empty.
+    Nothing is yielded if `log` is None.
     """
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())

@@ -247,7 +247,7 @@ class SystemEditor(FramedApp):
     def action_remove(self) -> None:
         """End the PDO link or the connection in the row under the cursor.
 
-        While the picture of the system is shown, the cursor is on a port. Then end a PDO link or a
+        If the system is shown as a picture and the cursor is on a port, end a PDO link or a
         connection of this port. If the port has several, the user selects one.
         """
         if (row := self.system.row) is None:

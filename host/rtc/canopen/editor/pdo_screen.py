@@ -316,9 +316,10 @@ class PdoScreen(ModalScreen[None]):
         self._command(write)
 
     def action_link(self) -> None:
-        """Remove the links of the PDO under the cursor.
+        """Link the PDO under the cursor with a PDO of another node, or remove such a link.
 
-        If the PDO has no links, ask the user for a PDO to link with it.
+        If an RPDO has a link, that link is removed. Otherwise, the user selects the other PDO. If
+        the two PDOs are linked already, their link is removed. If not, they are linked.
         """
         if (at := self._at()) is None:
             return

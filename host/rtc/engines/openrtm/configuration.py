@@ -30,7 +30,7 @@ class ConfigurationServant:
     editors. These sets cannot be changed.
 
     Two parts of the IDL are not emulated: parameters that belong to no set, and the operations by
-    which other processes add services and organizations (SDO).
+    which other processes add services and organizations (Super Distributed Objects of the OMG).
 
     Args:
         configuration: configuration to serve.

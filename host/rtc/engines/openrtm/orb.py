@@ -142,9 +142,7 @@ class Orb:
     def close(self) -> None:
         """Shut the ORB down: answer the running calls, refuse other calls, and free the port.
 
-        If another process closes the connection instead of answering a call, omniORB repeats the
-        call, and the repeated call may not end. If a call does not end, the ORB stays open, and a
-        line is logged.
+        If a call to another process does not end, the ORB stays open, and a line is logged.
         """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)

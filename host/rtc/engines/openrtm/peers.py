@@ -42,7 +42,7 @@ class Peers:
 
     Args:
         ports: ports of the system.
-        manager: manager of the system. Its `remotes` list the wanted connectors.
+        manager: manager of the system. The wanted connectors are in `manager.remotes`.
         look_us: interval in us at which each connector is checked.
 
     Raises:

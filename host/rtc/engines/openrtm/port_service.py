@@ -154,14 +154,13 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connection with an ID, which the peer or a tool is about to end.
+        """Prepare the end of a connection that the peer or a tool has requested.
 
-        The connection is marked, so that the peer is not notified of the end. The peer already
-        knows that the connection ends.
+        The peer already knows that the connection ends. So it will not be notified.
 
         Returns:
-            Two values: the connection, or None if there is none, and whether the ID is known. An ID
-            is known if its connector exists or has just ended.
+            The first value is the connection to a peer, or None if no such connection has this ID.
+            The second value is whether a connector with this ID exists or has just ended.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True

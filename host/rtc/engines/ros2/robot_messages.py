@@ -146,9 +146,10 @@ class _Speed:
         self._before: tuple[Time, Pose2D] | None = None
 
     def since(self, tm: Time, pose: Pose2D) -> Velocity2D:
-        """Return the velocity since the pose of the previous call, in m/s ahead and rad/s.
+        """Return the mean velocity between the previous pose and this pose.
 
-        The first call returns 0.
+        The previous pose is the pose of the previous call. The forward velocity is in m/s, and the
+        angular velocity in rad/s. The first call returns 0 for both.
         """
         before, self._before = self._before, (tm, pose)
         if before is None or (past_us := tm.us - before[0].us) <= 0:

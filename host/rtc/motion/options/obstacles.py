@@ -242,9 +242,9 @@ _LATEST: Final = {"dataport.buffer.length": "8"}
 class CollisionGuard:
     """Adds components to a cart's motion chain that stop the cart before obstacles.
 
-    The new components pass the data of the range finder on to the base, and run in the execution
-    context of the chain. The velocities of PathFollower then go to ObstaclesAvoidance first, and
-    from there to RefHardRh3.
+    The new components find obstacles in the data of the range finder, and run in the execution
+    context of the chain. PathFollower then sends its velocities to ObstaclesAvoidance.
+    ObstaclesAvoidance sends them to the base (RefHardRh3).
 
     Args:
         manager: manager that runs the chain.
