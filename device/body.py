@@ -36,8 +36,7 @@ class Pose(Immutable):
     def moved(self, left_m: float, right_m: float, tread_m: float) -> Pose:
         """Return the pose of a body after its left and right wheels have rolled at steady speeds.
 
-        The path is an arc. It is computed exactly: the chord of an arc has the heading that the
-        body has in the middle of the arc.
+        The path is an arc, and it is computed exactly.
 
         Args:
             left_m: distance that the left wheels rolled, in metres.
@@ -107,9 +106,8 @@ class Contact:
     def roll(self, turn_rad: float, step_s: float) -> float:
         """Turn the wheel by an angle; return the distance that it rolls over the ground, in metres.
 
-        The wheel turns at a steady speed during the step. Friction limits how fast the speed of the
-        wheel over the ground can change. If this speed cannot follow the speed of the wheel's rim,
-        the wheel slips.
+        The wheel turns at a steady speed during the step. Friction limits the acceleration of the
+        wheel over the ground. If the rim of the wheel accelerates more, the wheel slips.
         """
         rim_m_s = turn_rad * self.radius_m / step_s
         speed_m_s = rim_m_s

@@ -15,10 +15,10 @@ class Horizon(Part):
 
     Attributes:
         passed_us: time up to which all ticks are done.
-        until_us: time up to which a device may compute its ticks ahead. Until this time, the rig
-            does not read the device in each tick, and sees only the frames that the device sends
-            and receives. Only a scheduled action of the rig (an action of the event queue) may read
-            the device earlier, between two ticks.
+        until_us: time up to which a device may compute its ticks ahead. Before this time, the rig
+            only exchanges frames with the device and does not read its state. The only exception is
+            a scheduled action of the rig (an action of the event queue). It may read the state
+            between two ticks.
     """
 
     passed_us: int = 0

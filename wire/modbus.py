@@ -301,8 +301,8 @@ class Status(IntFlag):
 class Fault(IntFlag):
     """Reasons for which the driver of a two-wheeled base has switched a wheel off, as bits.
 
-    The registers 0201h and 0202h contain these bits. The proposed register map of the driver
-    defines no bits for these registers, so tickrig has chosen them.
+    The registers 0201h and 0202h contain these bits. The protocol of the driver was never
+    published, so tickrig has chosen the bits.
     """
 
     OVER_CURRENT = 0x01

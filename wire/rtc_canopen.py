@@ -56,13 +56,13 @@ class CanopenPortType(Generic[T]):
     Each element of a value is a separate sub-index in the object dictionary.
 
     Attributes:
-        name: name of the RTC type in Table 4.
+        name: name of the RTC type, such as `UnsignedShort`.
         data_type: CANopen data type of an element.
         kind: Python type of an element.
         length: number of elements.
         many: whether a value is a tuple of `length` elements. Otherwise a value is a single
             element.
-        width: number of bits of an element if its data type does not define it.
+        width: number of bits of an element, or 0 to use the number of bits of `data_type`.
 
     Raises:
         ValueError: a sequence has no elements.
@@ -359,7 +359,8 @@ class RtcProfile:
         """Return the ports with the objects and PDOs that are assigned to them.
 
         Args:
-            direction: direction of the ports that have a PDO, or None to return all ports.
+            direction: direction of the returned ports, or None. With a direction, ports without a
+                PDO are left out. With None, all ports are returned.
         """
         return tuple(
             port

@@ -108,7 +108,8 @@ class CanopenOutPort(_CanopenPort[T]):
     def write(self, value: T) -> None:
         """Set the value of the port.
 
-        While the component is Active, its TPDO is sent even if the value has not changed.
+        While the component is Active, the TPDO of the port is sent even if the value has not
+        changed.
 
         Raises:
             ValueError: the value does not have the type of the port.
@@ -293,14 +294,14 @@ _ENDING: Final = {
 class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     """Life cycle of a component: runs its callbacks when the NMT state of the CANopen node changes.
 
-    Once the component is initialized, its state is determined by the NMT state of the node. The
-    same callbacks run whether the NMT master, the error behaviour or the component itself changes
-    the NMT state. The callbacks for the new state run after all services of the node have been
-    notified of it.
+    Once the component is initialized, the NMT state of the node determines the state of the
+    component. When the NMT state changes, the services of the node are notified first. Then the
+    callbacks for the new state run.
 
     Args:
         node: CANopen slave on which the component runs.
-        make: function that makes a component whose ports are joined to the dictionary of the slave.
+        make: function that makes a component. The values of its ports are in the object dictionary
+            of the slave.
 
     Attributes:
         component: present component. A reset of the node makes a new component.
@@ -369,8 +370,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     def run(self) -> None:
         """Run the periodic callback of the present state, such as `on_execute`.
 
-        If the callback returns an error, the component changes to the state Error (transitions M5
-        and M6 of the life cycle).
+        If the callback returns an error, the component changes to the state Error.
         """
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)

@@ -151,11 +151,13 @@ class EmcyProducer(Service):
     """Sends an EMCY message when an error occurs, and another one when it is cleared (0000h).
 
     An error is identified by its error code and by the manufacturer-specific bytes of its message
-    (the argument `text`). 1001h is the union of the active errors, and its generic bit is set while
-    any error is active. The message at the end of an error contains the register of the remaining
-    errors. In the state Stopped and in bus-off, messages wait and are sent afterwards. A reset
-    clears all errors and waiting messages. Therefore a service must raise its error again if the
-    error still exists after the reset.
+    (the argument `text`). The error register 1001h combines the bits of all active errors, and its
+    generic bit is set while any error is active. Each message contains this register. Thus the
+    message that an error was cleared shows the errors that remain.
+
+    In the NMT state Stopped and in bus-off, messages wait and are sent afterwards. A reset clears
+    all errors and waiting messages. Therefore a service must raise its error again if the error
+    still exists after the reset.
 
     Not emulated: 29-bit CAN-IDs.
     """
@@ -306,8 +308,8 @@ _MAX_NODES: Final = 127
 class EmcyConsumer(Service):
     """Receives EMCY messages of other nodes. The object 1028h contains the COB-IDs of the messages.
 
-    Each sub-index of 1028h is for the node with this node-ID. The application decides how to react
-    to a message. A message that does not have exactly eight bytes is ignored.
+    The sub-index of an entry in 1028h is the node-ID of the other node. The application decides how
+    to react to a message. A message that does not have exactly eight bytes is ignored.
 
     Attributes:
         latest: latest EMCY since the reset, by node-ID.
@@ -363,8 +365,8 @@ class ErrorStateEmcy(Service):
     """Sends an EMCY when the CAN controller is error-passive (8120h) or back from bus-off (8140h).
 
     The error 8120h is cleared when the controller is error-active again. The error 8140h is sent
-    after the recovery from bus-off, and is cleared at once. For 1029h, bus-off is a communication
-    error.
+    after the recovery from bus-off, and is cleared at once. When the controller becomes bus-off,
+    the slave reacts as the object 1029h:01 defines for communication errors.
 
     Not emulated: the recovery of the controller itself.
 

@@ -184,8 +184,9 @@ class Service(Copyable):
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
         """Yield the CAN-IDs of frames that may change which CAN-IDs the slave receives.
 
-        The emulated bus has an acceptance filter for each slave. After one of the frames above, the
-        filter of this slave lets all frames pass, until the slave has handled the frame.
+        The emulated bus has an acceptance filter for each slave. After a frame with one of these
+        CAN-IDs, the filter of this slave is open for all frames, until the slave has handled the
+        frame.
 
         Args:
             state: present NMT state.

@@ -101,12 +101,14 @@ class Gearbox:
 
         Args:
             tick: number of the tick.
-            mode: reverse mode 0 to 3, from parameter #7 of the command `joystick` or from the
-                buttons.
-            stick: translation and rotation as received, which choose the gear.
-            shaped: translation and rotation after `shape`, which drive the motors (DECISION R18).
-            knobs: the command `joystick`. Its parameters #8 to #10 are used: the neutral radius and
-                the angles `switch_deg` and `fade_deg`.
+            mode: reverse mode 0 to 3 (see `Gearbox`), which parameter #7 of the command `joystick`
+                or the buttons set.
+            stick: translation and rotation of the stick as received. The angle of the stick
+                determines the gear.
+            shaped: the same translation and rotation after `shape`. The result is computed from
+                these values (DECISION R18).
+            knobs: parameters of the command `joystick`. This method uses #8 to #10: the neutral
+                radius, and the angles `switch_deg` and `fade_deg`.
         """
         v_pct, w_pct = shaped
         if mode == 0:
@@ -194,7 +196,8 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
         value_pct: position of the stick, -100..100 %. The result has the same sign.
         low_pct: largest value that counts as 0, 0..99 %.
         high_pct: smallest value that counts as 100 %, above `low_pct`, at most 100 %.
-        exponent: exponent of the curve, 0..15. The power is 1 + 0.1 * exponent.
+        exponent: number 0..15 that selects the curve x^p, with p = 1 + 0.1 * exponent. Here x is
+            the position between `low_pct` and `high_pct`, from 0 to 1.
 
     >>> shape(-50, 0, 100, 5)
     -35
@@ -207,11 +210,10 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits of a `limit` command, with their signs.
 
     First translation and rotation are each limited to their own limit. Then both are multiplied by
-    the same factor, so that the direction of travel stays the same. The command `limit` has limits
-    for the sum of both values, for their product, and for the radius (the root of the sum of their
-    squares). For each of these limits there is a largest factor with which the values stay within
-    the limit. The smallest of the three factors is used (RRC manual, `limit`). All arithmetic is
-    integer and rounds down (DECISION R19).
+    the same factor, so that the direction of travel stays the same. The command also has limits for
+    the sum of both values, for their product, and for the root of the sum of their squares. The
+    factor is the largest one, at most 1, that keeps all three limits (RRC manual, `limit`). All
+    arithmetic is integer and rounds down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)

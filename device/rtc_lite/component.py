@@ -119,8 +119,8 @@ _MAX_PORTS: Final = 8
 class LiteComponent(DeviceComponent):
     """Base class of components that run on a small controller (RTComponent-Lite).
 
-    A subclass defines the properties and callbacks. The callbacks are those of Table 1 of the
-    paper.
+    A subclass defines the properties and callbacks. The callbacks are those of
+    RTComponent-Lite-0.4.0 (Suzuki et al., RSJ 2007, Table 1).
 
     Attributes:
         type_name: type of the component, with 1 to 15 characters.
@@ -128,8 +128,8 @@ class LiteComponent(DeviceComponent):
         out_ports: out-ports by name, in order of declaration.
 
     Raises:
-        ValueError: the type name is missing, an input accepts fractions, or the component does not
-            fit into a PIC.
+        ValueError: the type name is invalid, an input accepts fractions, there are more than 8
+            in-ports or more than 8 out-ports, or two of them have the same name.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):

@@ -84,10 +84,10 @@ class GearParameters(Immutable):
 
     Attributes:
         ratio: number of motor turns per turn of the output shaft.
-        efficiency: share of the power of an external torque that the gear transmits, above 0 and up
-            to 1. If the torque acts against the motion, the motor must supply the torque divided by
-            `efficiency`. If the torque acts in the direction of the motion, only the share
-            `efficiency` of the torque reaches the motor.
+        efficiency: efficiency of the gear for an external torque, above 0 and up to 1. If the
+            torque acts against the motion, the motor must supply the torque divided by
+            `efficiency`. If the torque acts in the direction of the motion, the torque multiplied
+            by `efficiency` reaches the motor.
         inertia_kg_m2: inertia at the output shaft, without the motor's own inertia.
         coulomb_nm: dry friction at the output shaft.
     """

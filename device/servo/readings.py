@@ -37,9 +37,8 @@ _Temperatures = tuple[float, float]
 class ThermalModel(Part):
     """Thermal model of a motor: winding and housing, heated by the current in the winding.
 
-    The heat is R I^2, and R is a linear function of the temperature. While the mean square of the
-    current stays the same, the differential equations are therefore linear in the temperatures. So
-    a formula gives the temperatures at any later time, without steps in between.
+    The heat is R I^2, and R is a linear function of the temperature. For a constant mean square of
+    the current, a formula gives the temperatures at any later time, without steps in between.
 
     The model does not include heat from friction and iron, the gear, the power stage and moving
     air.
@@ -111,10 +110,10 @@ def _span(rate: float, seconds: float) -> float:
 class I2t(Part):
     """I2t protection of a power stage, which limits the time of currents above the continuous one.
 
-    The protection has a budget of (peak^2 - continuous^2) * time. While the current is above the
-    continuous current, the budget fills by the difference of the squared currents. While the
-    current is below, the budget drains. When the budget is full, only the continuous current is
-    allowed until the budget is empty again.
+    The protection has a budget of (peak^2 - continuous^2) * time. A current above the continuous
+    current uses up the budget, at a rate equal to the difference of the squared currents. A current
+    below the continuous current restores the budget in the same way. When the budget is used up,
+    only the continuous current is allowed until the whole budget is restored.
 
     Attributes:
         filled_a2s: used part of the budget.

@@ -18,9 +18,7 @@ class Immutable:
     Copies of a machine within the process share such an object. A pickle contains its value.
 
     Attributes:
-        shared_by_twins: flag that is always true. The code that copies a machine reads it. A class
-            in the package `tickrig.wire` has this attribute itself instead of this base class,
-            because that package does not import `tickrig.device`.
+        shared_by_twins: flag that is always true. The code that copies a machine reads it.
     """
 
     __slots__ = ()
@@ -58,8 +56,8 @@ class Copyable:
     Other input to the twin does not affect the original.
 
     Attributes:
-        _new_in_twins: attributes that have the given values in a twin instead of copies, such as
-            callbacks of outside code.
+        _new_in_twins: names of attributes that are not copied, such as callbacks of outside code,
+            and the values that these attributes get in a twin.
     """
 
     __slots__ = ()

@@ -226,7 +226,8 @@ class Beams(Part):
         y_m: position of the sensor in y, in metres.
         rays: directions of the beams as unit vectors. Each direction is `tau / turn` after the
             previous one.
-        first_rad: direction of the first beam, in radians. Its absolute value is at most 2e6.
+        first_rad: direction of the first beam, in radians, -2e6..2e6. More than one full turn is
+            allowed.
         turn: number of beams in a full turn. `rays` has at most this number.
     """
 
@@ -356,8 +357,8 @@ class View(Immutable):
         """Return the distances of a range of steps in mm: the least distance of each cluster.
 
         A step is one direction of the scan, and a cluster is a group of consecutive steps. If no
-        step of a cluster has a distance, the number of the cluster is the error code of its first
-        step. The result has no numbers for steps after the last whole cluster (DECISION U11).
+        step of a cluster has a distance, the result contains the error code of the first step of
+        this cluster instead. Steps after the last whole cluster are ignored (DECISION U11).
 
         Args:
             first: first step.

@@ -193,10 +193,9 @@ class WireFaults(Protocol):
 class AssemblyFaults(Copyable):
     """The faults of a rig with several wires, and with CANopen nodes on them, under unique names.
 
-    A fault of a wire has the name `WIRE/fault`, or its plain name if there is only one wire. A
-    fault of a node has the name `NODE/fault`. If there is only one device, a fault of this device
-    has its plain name. If the wire has a fault with the same plain name, the fault of the device
-    keeps the name `NODE/fault`.
+    A fault of a wire has the name `WIRE/fault`. With only one wire, the name is `fault` without the
+    prefix. A fault of a node has the name `NODE/fault`. With only one device, the name is `fault`
+    without the prefix, unless the wire has a fault of that name.
 
     Args:
         wires: wires by name.
@@ -687,9 +686,10 @@ class Operator(Copyable):
             )
 
     def full_name_of(self, name: str) -> str:
-        """Return the name of a fault as in `faults`, without an unnecessary prefix.
+        """Return the name of a fault as the attribute `faults` contains it.
 
-        If there is only one node, `NODE/fault` becomes `fault`. Other names are returned unchanged.
+        If there is only one node, the name `NODE/fault` becomes `fault`. Other names are returned
+        unchanged.
         """
         bare = name.rpartition("/")[2]
         more = bare != name and name in self._wire.fault_types and name not in self.faults

@@ -247,12 +247,10 @@ class CanEnd(EndFields):
 
 
 class Babbler(CanEnd):
-    """A faulty node ("babbling idiot") that sends all the time and ignores its error state.
+    """A faulty node ("babbling idiot") that sends all the time and ignores its error state."""
 
-    This class is defined next to its base class `CanEnd` for a technical reason. If the optional
-    kernel in C is installed, `CanEnd` has its fields from the kernel. A class in a module that
-    mypyc compiles cannot derive from a class with such fields.
-    """
+    # In the module of `CanEnd`: a class in a module that mypyc compiles cannot derive from `CanEnd`
+    # while the optional kernel in C defines its fields.
 
     __slots__ = ()
 

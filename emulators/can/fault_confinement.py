@@ -22,9 +22,9 @@ _BACK_FROM_PASSIVE: Final = 119
 class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
-    Two rules are not emulated. In reality, a receiver adds 8 to its error counter after a dominant
-    bit that follows its error flag. In reality, there is also a warning limit of 96, but it is not
-    a state.
+    Two rules of the standard are not emulated. First, the receive error counter grows by 8 if a
+    receiver sees a dominant bit directly after its own error flag. Second, a node gives a warning
+    if one of its counters reaches 96.
 
     Attributes:
         tec: transmit error counter.
@@ -97,8 +97,6 @@ class ErrorCounters(Part):
 
 class FaultConfinement(Part):
     """Updates the error counters and error states of all nodes of a bus.
-
-    While all counters are 0, the bus need not count frames without errors.
 
     Args:
         ends: all ends of the bus.

@@ -58,8 +58,8 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
 
     Args:
         specs: the nodes.
-        profile: profile for nodes of files without a profile, which is a name of
-            `choices.PROFILES`.
+        profile: name of a profile in `choices.PROFILES`. It is used for each node without a profile
+            of its own.
 
     Raises:
         ValueError: a file is unusable, or a node-ID is missing or duplicate.

@@ -353,9 +353,9 @@ class EdsCache:
     """Cache of EDS and DCF files: reads each file once, and again when it has changed.
 
     Attributes:
-        others: cached results of functions that read several files, such as `read_bus`. The key is
-            the arguments of the function that determine the result, such as the path of the
-            bus.yml. Each result is stored with the versions of the files from which it was made.
+        others: cached results of functions that read several files, such as `read_bus`. A key
+            contains arguments of such a function, such as the path of the bus.yml. Each result is
+            stored with the versions of the files from which it was made.
     """
 
     def __init__(self) -> None:

@@ -82,7 +82,7 @@ def matching(accepts: Callable[[str], object], what: str) -> _Taker:
 
     Args:
         accepts: function that returns whether a text is valid.
-        what: description of the valid texts, for the message about another value.
+        what: description of the valid texts. The error message for an invalid value contains it.
     """
 
     def take(value: object) -> str:
@@ -242,9 +242,8 @@ class Notes:
     Attributes:
         document: parsed file, which gives the line of each value.
         mistakes: errors found until now.
-        names: texts that replace keys in error messages. The mapping has the path of a key and its
-            text. Keys without such a text are shown as in the file. For a rig file without a
-            bus.yml the mapping is empty.
+        names: texts that replace keys in error messages, by path of the key. Other keys are shown
+            as in the file.
     """
 
     document: TomlDocument

@@ -106,9 +106,9 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table in this table that one key of a header such as `[a.b]` names.
+        """Return the table with the given key inside this table, for a header such as `[key.b]`.
 
-        A missing table is created. If the key names an array of tables, the last table of the array
+        A missing table is created. If the key has an array of tables, the last table of the array
         is returned.
 
         Raises:
@@ -144,13 +144,13 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table in this table for the first part `a` of a dotted key such as `a.b = 1`.
+        """Return the table with the given key inside this table, for a line such as `key.b = 1`.
 
         A missing table is created.
 
         Raises:
-            _TakenError: the key has a value that is not a table, or its table has a header such as
-                `[a]`. TOML does not allow dotted keys to add to such a table.
+            _TakenError: the key has a value that is not a table, or the key has a table with a
+                header `[key]`. TOML does not allow a dotted key to add to such a table.
         """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:

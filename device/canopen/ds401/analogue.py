@@ -276,10 +276,10 @@ def _read(entry: Entry) -> bytes:
 class AnalogueInput(Part):
     """One analogue input channel: converts and scales its value, and detects its events.
 
-    A channel can have several integer objects, such as objects of 8 and of 16 bits. Integer limits
-    and deltas are numbers in the unit of the widest of these objects. REAL32 limits and deltas are
-    in the unit of the object 6403h. If the device has no objects for limits and deltas, each change
-    of the value is an event.
+    Several integer objects can contain the value of a channel, such as an object of 8 bits and one
+    of 16 bits. Integer limits and deltas apply to the number in the widest of these objects. REAL32
+    limits and deltas apply to the number in the object 6403h. If the device has no objects for
+    limits and deltas, each change of the value is an event.
 
     Attributes:
         number: number of the channel, 1..254.
@@ -390,10 +390,10 @@ def _justified(counts: int, from_bits: int, to_bits: int) -> int:
 class AnalogueOutput(Part):
     """One analogue output channel: drives its level from the objects that the bus writes.
 
-    An integer error value is a number in the unit of the object that contains the value of the
-    channel. It is limited to the range of this object. If several objects contain the value of the
-    channel, the object that changed last sets the level, and the other objects keep their values. A
-    NaN or infinity leaves the level unchanged.
+    Several objects can contain the value of a channel. The object that changed last sets the level,
+    and the other objects keep their values. After an error of the device, the channel can output
+    its error value instead. An integer error value (6444h) has the scale of the object that changed
+    last, and is limited to the range of this object. A NaN or infinity leaves the level unchanged.
 
     Attributes:
         number: number of the channel, 1..254.

@@ -85,8 +85,8 @@ def command_of(controlword: int) -> Command | None:
 class Automaton(Part):
     """The state machine of a drive (CiA 402), which follows the controlword and faults.
 
-    If the option codes require it, the motor is braked before the drive leaves the state Operation
-    enabled to Switched on (transition 5) or to Ready to switch on (transition 8).
+    The transitions 5 and 8 lead out of the state "Operation enabled". If the option codes require
+    it, the motor is braked before these transitions.
 
     Args:
         stopping: object that brakes according to the option codes.
@@ -149,7 +149,7 @@ class Automaton(Part):
     def run(self) -> bool:
         """Run one control period of the state machine, for example a period of a quick stop.
 
-        The drive calls this method instead of its mode of operation while the mode is not active.
+        The drive calls this method in each control period in which no mode of operation is active.
 
         Returns:
             True if the drive has no work until an input changes.
@@ -210,8 +210,8 @@ class Bounds(Immutable):
         winding_dc: highest temperature of the winding, in 0.1 degC.
         winding_warning_dc: temperature of the winding from which the drive warns, in
             0.1 degC.
-        stall_us: time for which the motor may stand although a motion is demanded or its current is
-            limited, in us.
+        stall_us: time in us for which the motor may stand in two cases: a motion is demanded, or
+            the current of the motor is limited.
     """
 
     supply_mv: tuple[int, int] = (9_000, 36_000)

@@ -30,9 +30,9 @@ class Control(Enum):
 class Reference(Part):
     """The demanded motion of a drive. It belongs to the drive, so it survives a change of mode.
 
-    Quantities that a mode does not control follow the motor: the position in velocity modes,
-    position and velocity in torque modes. Therefore the reference does not jump when the next mode
-    starts.
+    Quantities that a mode does not control follow the motor. In velocity modes, the position
+    follows. In torque modes, the position and the velocity follow. Therefore the reference does not
+    jump when the next mode starts.
 
     Attributes:
         position: demanded position in counts of the motor's encoder.
@@ -347,9 +347,9 @@ class Stopping(Part):
         """Brake the motor for one control period on the ramp that an option code chooses.
 
         Args:
-            ramp: value of a member of `Ramp`. The member chooses one of four ways: not to brake, to
-                brake with the profile deceleration, to brake with the quick stop deceleration, or
-                to brake as hard as the current limit allows.
+            ramp: number from the enumeration `Ramp`. The number 0 means no braking, 1 the profile
+                deceleration, 2 the quick stop deceleration, and 3 the largest deceleration that the
+                current limit allows.
 
         Returns:
             True if the motor stands or does not need to be slowed down.
@@ -395,9 +395,9 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 class Switches(Part):
     """The limit switches and the home switch of an axis, as the drive reads them.
 
-    A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles.
-    "Negative" and "positive" limit switch mean the directions that the user sees, to which the
-    polarity 607Eh is already applied.
+    A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. The
+    negative limit switch belongs to the negative direction of the user, and the positive one to the
+    positive direction. The polarity 607Eh is already part of these directions.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.

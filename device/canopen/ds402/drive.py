@@ -240,9 +240,9 @@ class Ds402(Application):
     def goes_on_plainly(self) -> bool:
         """Whether the next ticks only continue the motion of the mode of operation.
 
-        Several ticks can then be computed at once. The value is false in each of these cases: an
-        input or a setting has changed, a time-out runs, an actual value has watchers and is
-        therefore needed in each tick, or a limit switch could act.
+        Several ticks can then be computed at once. The value is false if an input or a setting has
+        changed, if a time-out runs, or if a limit switch could act. It is also false if a function
+        must be called for each change of an actual value.
         """
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free

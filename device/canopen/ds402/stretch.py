@@ -44,10 +44,10 @@ class Stretch(Part):
 
         Args:
             now_us: time of the present tick.
-            requested: whether a frame or an input caused the present tick. If true, the time since
-                the previous tick of this kind becomes the estimate of the quiet time, which limits
-                the number of computed ticks. If false, the drive itself had scheduled the present
-                tick.
+            requested: whether a frame or an input caused the present tick. If false, the drive
+                itself had scheduled the tick. The interval between the last two requested ticks
+                limits the number of computed ticks, because the next request is expected after the
+                same interval.
 
         Returns:
             The duration of the computed ticks in microseconds, or 0 if none were computed.

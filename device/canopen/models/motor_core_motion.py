@@ -503,7 +503,8 @@ class Display(Part):
     Args:
         dictionary: the dictionary of the unit.
         shaft: shaft that supplies the measurements.
-        references: object that converts measurements with the full scales.
+        references: object with the full scales of angle, velocity and current. It converts
+            measurements to the numbers in 6401h.
     """
 
     def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:

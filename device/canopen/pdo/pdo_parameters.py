@@ -273,8 +273,9 @@ class RtrSynchronous(TpdoMode):
 class EventDriven(TpdoMode):
     """Transmission types 254 and 255: the TPDO is sent on an event and by the event timer.
 
-    It is also sent at the start. After a transmission the next one waits until the inhibit time has
-    passed. The TPDO then contains the newest data.
+    The TPDO is also sent when it becomes active, for example when the node enters Operational.
+    After a transmission the next one waits until the inhibit time has passed. The TPDO then
+    contains the newest data.
     """
 
     timed: ClassVar[bool] = True
@@ -294,8 +295,8 @@ class EventDriven(TpdoMode):
     def run(self, now_us: int) -> None:
         """Send the TPDO if the inhibit time is over; otherwise wait for its end.
 
-        If this call is due only because the event timer was changed, the event timer is restarted
-        and the TPDO is not sent.
+        If only the time of the event timer was changed, this method restarts the timer and sends no
+        TPDO.
         """
         if self._retimed and not self._marked:
             self._time_anew(now_us)

@@ -141,8 +141,9 @@ class CanHost:
 
         Args:
             timeout_us: longest wait; None for no limit.
-            more: whether this call continues an earlier wait with a timeout. Both calls then count
-                as one wait for the limit on the waits of hosts (`host_limit` of the rig).
+            more: whether this call continues an earlier wait with a timeout. The rig limits the
+                number of waits of hosts (`host_limit`), and does not count such a call as another
+                wait.
 
         Returns:
             Time and frame, or None after the timeout.

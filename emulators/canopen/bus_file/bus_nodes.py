@@ -75,7 +75,7 @@ class _NodeMaker:
         robot: joints of the robot, or None if there is no description of them.
         cache: cache of EDS files.
         mistakes: list that collects errors.
-        profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
+        profile: name of a profile in `choices.PROFILES`, for nodes without a profile.
 
     Attributes:
         remarks: list of warnings.
@@ -332,7 +332,7 @@ def read_bus(
             taken from the key `urdf` in the mapping `tickrig:` of the section `options:` in the
             bus.yml.
         cache: cache of EDS files and slaves.
-        profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
+        profile: name of a profile in `choices.PROFILES`, for nodes without a profile.
 
     Raises:
         OSError: the bus.yml or the URDF cannot be read.

@@ -50,8 +50,8 @@ class NodeKeys:
         joint: arguments of `JointDrive` by name.
         modes: numbers of the node's modes of operation, or None to use the modes in its files.
         profile: name of `choices.PROFILES`, or None for `auto`.
-        configured: whether the objects of the node have, from the start, the values that the master
-            would write to them at boot-up.
+        configured: whether the emulated node starts with the object values that its master would
+            otherwise write at boot-up.
         start: initial inputs by name.
         places: positions of the keys and inputs in the file.
     """

@@ -196,8 +196,9 @@ class _Publisher(Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `take` will return values.
 
-        If no value waits, the time is `NEVER`. If a new value waits with the subscription type
-        `new`, the time is 0, which means at once.
+        If no value waits, the time is `NEVER`. If a value waits, the time depends on the
+        subscription type of the connector. With `new`, the time is 0, which means at once. With
+        `periodic`, the time is 0 until a tick has planned the push. Then it is the planned time.
         """
         if not len(self._values):
             return NEVER
@@ -270,8 +271,9 @@ class Connector(ConnectorBase, Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `tick` will push values to the InPort.
 
-        If no value waits, the time is `NEVER`. If a new value waits with the subscription type
-        `new`, the time is 0, which means at once.
+        If no value waits, the time is `NEVER`. If a value waits, the time depends on the
+        subscription type of the connector. With `new`, the time is 0, which means at once. With
+        `periodic`, the time is 0 until a tick has planned the push. Then it is the planned time.
         """
         return self._publisher.due_us if self._publisher else NEVER
 

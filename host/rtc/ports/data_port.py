@@ -48,7 +48,7 @@ class OutPort(DataPort[T]):
     Each connector of the port gets each value, and transfers the value according to its
     `dataport.*` properties (`ConnectorOptions.parse`).
 
-    Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
+    Not emulated: the listeners of OpenRTM for events inside a connector, such as ON_BUFFER_WRITE.
 
     Args:
         name: name of the port without the name of its component, such as `out`.

@@ -129,9 +129,10 @@ C = TypeVar("C", bound=ConnectorBase)
 
 
 class PortGuard(Protocol):
-    """Object that enforces the limits of a node, such as an emulated T-Kernel node, for a port.
+    """Object that can refuse a new connector of a port, or a value that the port transfers.
 
-    The port asks its guard before the port is connected, and before it sends a value.
+    Example: an emulated T-Kernel node limits the number of its connectors and the size of a value.
+    So the node is the guard of its ports.
     """
 
     def admit(self, connector: ConnectorBase, /) -> None:

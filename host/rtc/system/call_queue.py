@@ -28,11 +28,11 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 class CallQueue:
     """Queue of calls from other threads, which the manager's thread executes between its ticks.
 
-    Other threads use it because only the manager's thread may access a manager. A `ServingClock`
-    calls `serve` while it waits for the next tick. The manager's thread may also serve a control
-    socket with a `LineServer`. In this case the thread calls `attach(queue, queue.make)` of the
-    server once. Then the server waits for this queue, too, and calls `queue.make` to execute the
-    waiting calls.
+    Other threads use it because only the manager's thread may access a manager. The manager's
+    thread executes the calls in one of two ways. With a `ServingClock`, the clock calls `serve`
+    while it waits for the next tick. With a `LineServer` (the server of a control socket), the
+    thread calls `server.attach(queue, queue.make)` once. The server then calls `queue.make`
+    whenever calls wait.
     """
 
     def __init__(self) -> None:
@@ -161,8 +161,8 @@ class Arrivals:
     processes the queue in each tick.
 
     Attributes:
-        due_us: time of the next tick that the queue needs for itself. It is always `NEVER`: the
-            queue requests no tick, so the values wait for a tick that is due for another reason.
+        due_us: always `NEVER`, because the queue requests no tick. The values wait for a tick that
+            is due for another reason.
     """
 
     due_us: Final = NEVER

@@ -100,8 +100,9 @@ class RemoteEntry:
 
     Attributes:
         name: name of the component in the system, such as `Joystick0` in `Joystick0.out`.
-        path: path of the component for the code that connects to the other process (the engine,
-            such as OpenRTM-aist). An example is `localhost:2809/robot.host_cxt/Joystick0.rtc`.
+        path: path by which an engine finds the component. An engine is code that connects to other
+            processes, such as the code for OpenRTM-aist. An example of a path is
+            `localhost:2809/robot.host_cxt/Joystick0.rtc`.
     """
 
     name: str

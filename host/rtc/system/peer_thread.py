@@ -37,7 +37,7 @@ class _CallingThread(threading.Thread):
 def calls_run() -> bool:
     """Return whether a `PeerThread` that was closed still executes a call into another process.
 
-    A process that ends during such a call may abort or hang, because the call is in C++ code.
+    If this process ends during such a call, it may abort or hang, because the call is in C++ code.
     """
     threads = threading.enumerate()
     return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
@@ -46,7 +46,7 @@ def calls_run() -> bool:
 class PeerThread:
     """Thread that makes all calls to one component in another process (the peer), one by one.
 
-    If a call hangs, the calls after it wait until the time-out of the engine (1 s for a CORBA
+    If a call hangs, the later calls wait until the hanging call ends by a time-out (1 s for a CORBA
     call). The thread is a daemon thread, so it does not keep the process alive.
 
     Args:

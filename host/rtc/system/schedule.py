@@ -155,7 +155,7 @@ class Clock(Protocol):
             t_us: time in us.
 
         Returns:
-            The delay of the return in us, or 0 if it is on time.
+            The time in us by which this method returns too late, or 0 if it returns on time.
         """
         ...
 
@@ -186,7 +186,7 @@ class RealTime:
     def run(self) -> None:
         """Run the schedule in real time until `stop` is called.
 
-        A callback, a listener, or a client that the clock serves can call `stop`.
+        For example, a callback of a component or a function in `after_tick` can call `stop`.
         """
         while self.running:
             self.step()

@@ -37,8 +37,8 @@ class Fetched:
 class Source(Protocol):
     """Interface of a source that returns the text at an address without blocking its caller.
 
-    Each request ends with a result, at the latest after a time-out. In real time, the source is an
-    HTTP client with its own thread. In virtual time, it is a table with a delay.
+    Each request ends with a result, at the latest after a time-out. One source is an HTTP client
+    with its own thread. Another source uses an emulated service in virtual time.
     """
 
     def request(self, address: str, now_us: int) -> None:
@@ -123,7 +123,7 @@ class _Entry(Generic[_V]):
 
 
 class LookupCache(Generic[_V]):
-    """Cache of values by address in front of a source.
+    """Cache that stores the values of addresses, and requests missing values from a source.
 
     If the source is not available, the cache returns old values.
 
@@ -132,7 +132,7 @@ class LookupCache(Generic[_V]):
             address counts as unknown.
 
     Attributes:
-        counts: numbers of look-ups by result.
+        counts: numbers of hits, misses and failed requests.
         trouble: reason why the latest request failed, empty if it succeeded.
         invalid: latest text that `parse` rejected, with the reason.
     """

@@ -133,7 +133,7 @@ class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
     The ports are `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was
     received) and `levels` (signal level of each ucode in per cent). If the reader sends nothing,
     the component starts it again each second. If the line is closed, the component moves to Error.
-    The report (Fig. 123) has only the name of the component. Ports and parameters are additions.
+    The NEDO report (Fig. 123) only names the component. tickrig has added the ports and parameters.
 
     Args:
         instance_name: name of the component.

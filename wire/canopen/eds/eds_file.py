@@ -356,9 +356,10 @@ def encoding_of(data: bytes) -> str:
 
     The encoding is UTF-16 if the file has the byte order mark or if every other byte at the start
     is zero. It is UTF-8 if the file is valid UTF-8. Otherwise it is one of the single-byte
-    encodings CP850 and Windows-1252. To choose one, the function looks at the bytes above 7Fh
-    inside words. It counts the bytes that are letters only in CP850, and the bytes that are letters
-    in Windows-1252. If the first count is larger, the encoding is CP850, or else Windows-1252.
+    encodings CP850 and Windows-1252. To choose one, the function compares the numbers of two groups
+    of bytes inside words. Bytes from 80h to 9Ah and from A0h to A5h are letters in CP850. Bytes
+    from C0h to FFh, except E1h, are letters in Windows-1252. If the first group is larger, the
+    encoding is CP850, or else Windows-1252.
 
     Args:
         data: content of the file.

@@ -326,13 +326,12 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
     Args:
         kind: data type of the limited value.
         text: text, which is not empty.
-        upper: whether the limit is HighLimit, or else LowLimit. A HighLimit above the range of the
-            data type, or a LowLimit below this range, excludes no value. Such a limit is returned
-            unchanged.
+        upper: whether the limit is HighLimit, or else LowLimit.
 
     Returns:
-        The limit. The result is None if values of this type have no limits, or if the limit depends
-        on the node-ID.
+        The limit. It may be outside the range of the data type: a HighLimit above the range, or a
+        LowLimit below it, is returned unchanged. The result is None if values of this type have no
+        limits, or if the limit depends on the node-ID.
 
     Raises:
         ValueError: the text is not a number of at most 64 bits.

@@ -80,8 +80,8 @@ class CyclicPosition(_LatchedSetPoint):
     The torque offset, and an extrapolation of the motion when SYNC is late, are not emulated.
 
     Attributes:
-        rests: whether the drive may rest while the target is the present position. The flag is true
-            for this class and false for subclasses that do work in each tick.
+        rests: whether the drive needs no ticks while it stands at the target. The value is True in
+            this class, and False in subclasses that have work in each tick.
     """
 
     shows_following_error = True
@@ -135,14 +135,14 @@ class CyclicPosition(_LatchedSetPoint):
 
 
 class InterpolatedPosition(CyclicPosition):
-    """Interpolated position mode (ip): moves to the data record 60C1h:01 on a straight line.
+    """Interpolated position mode (ip): moves on a straight line to the set-point in 60C1h:01.
 
     The axis moves while bit 4 of the controlword is set, and bit 12 of the statusword is then set.
     Otherwise the axis brakes with the profile deceleration. Each motion takes one interpolation
-    period, and bit 10 is set at its end. Each SYNC begins a new line. Without SYNC, a new record
+    period, and bit 10 is set at its end. Each SYNC begins a new line. Without SYNC, a new set-point
     begins a new line.
 
-    A buffer of records (60C4h) and sub-modes other than 0 (60C0h) are not emulated.
+    A buffer of set-points (60C4h) and sub-modes other than 0 (60C0h) are not emulated.
     """
 
     halts = True

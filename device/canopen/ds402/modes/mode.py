@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 
 class ModeBit(IntEnum):
-    """Bits of the statusword whose meaning depends on the mode of operation.
-
-    The members are plain numbers, which are faster than the members of a flag.
-    """
+    """Bits of the statusword whose meaning depends on the mode of operation."""
 
     TARGET_REACHED = Statusword.TARGET_REACHED
     MODE_12 = Statusword.MODE_12
@@ -122,8 +119,7 @@ class Mode(Part):
         A drive calls this method to compute several ticks at once.
 
         Returns:
-            The demanded positions on a straight line. The attribute `most` of the line is the
-            largest velocity for which the line is valid. The result is None if each step needs a
+            The straight line on which the demanded positions are, or None if each step needs a
             separate call of `step`.
         """
         return None
