@@ -142,13 +142,13 @@ def read_config(
 def check_needed(
     fields: Iterable[DeviceField], values: Mapping[str, object], given: Container[str]
 ) -> None:
-    """Raise ValueError if a configuration field is set that has no effect without another field.
+    """Raise ValueError if the user has set a field that has no effect without another field.
 
     Args:
         fields: configuration fields of a device type.
         values: values of all fields by field name.
-        given: names of the fields that the user has given. A field that was given its default does
-            not count as set.
+        given: names of the fields for which the user has given a value. If this value is the
+            default, the field raises no error.
     """
     known = {field.name: field for field in fields}
     for name, field in known.items():

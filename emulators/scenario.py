@@ -105,10 +105,11 @@ class ScenarioParser:
         device: device whose inputs and outputs the scenario may name.
         operator: operator of the device, which checks the names and values in actions such as
             `set`, `press` and `fault`.
-        encoders: functions by the names of additional verbs. Such a verb sends a line like the verb
-            `send`; its function makes the bytes of the line from the text in the scenario.
-        senders: functions by the names of verbs, for a wire without text lines. If they are given,
-            the scenario has these verbs instead of `send`, `raw` and the verbs of `encoders`.
+        encoders: functions of additional verbs that send to the device, by name of the verb. The
+            function gets the text after the verb in the scenario, and returns the bytes to send.
+        senders: functions of the verbs that send on a wire without text lines, by name of the verb.
+            If they are given, the scenario has these verbs instead of `send`, `raw` and the verbs
+            of `encoders`.
     """
 
     def __init__(

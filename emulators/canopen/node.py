@@ -352,8 +352,12 @@ class _NodeInputs:
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
         """Return the description of a physical input.
 
+        Args:
+            name: name of the input.
+            signal_type: required type of the input, or None to accept any type.
+
         Raises:
-            ValueError: no input has the name and the type.
+            ValueError: no input has this name, or the input has another type.
         """
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):

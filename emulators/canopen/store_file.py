@@ -44,8 +44,8 @@ class StoreFile:
     def nonvolatile(self, name: str, dictionary: Dictionary) -> Nonvolatile:
         """Return the non-volatile memory of a node, as read from the file.
 
-        The node changes this object when it stores something. The memory is empty for a new node.
-        Stored values that do not fit the dictionary, because the EDS has changed, are dropped.
+        The memory of a new node is empty. The node writes the values that it stores into this memory.
+        If the EDS has changed, values that do not fit the dictionary are dropped.
 
         Args:
             name: name of the node.

@@ -155,8 +155,8 @@ class ConfiguredDevice:
     """A device that was made from a command line or a rig file, with its settings.
 
     Attributes:
-        type: type of the device. It may be a changed copy of the listed type. For example, the
-            option `--node` of an RTC-Lite node changes the title and the verbs of the type.
+        type: type of the device. Options of the command line can change the type. For example, the
+            option `--node` of an RTC-Lite node changes its title and its verbs.
         device: the device.
         config: all settings of the device, which a trace records.
     """
@@ -255,8 +255,8 @@ def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = 
     Args:
         config: the configuration, as in a trace.
         defaults: all settings of the device with their defaults.
-        owner: beginning of the error message for an unknown setting, such as `an RRC has no
-            setting`. In the message the name of the setting follows.
+        owner: text before the name of an unknown setting in the error message, such as `an RRC has
+            no setting`.
         typed: whether a value must have the type of its default.
 
     Raises:

@@ -29,7 +29,8 @@ def check_plot(path: Path, option: str = "--plot", *others: str) -> None:
     Args:
         path: path of the picture.
         option: the option with the path, for the message.
-        others: further suffixes that the option accepts, for the message.
+        others: suffixes that the option accepts in addition to the suffixes of pictures. They
+            appear only in the message.
     """
     if path.suffix.lower() not in _FORMATS:
         raise Refused(f"{option} {path}: the name ends in {', '.join((*_FORMATS, *others))}")

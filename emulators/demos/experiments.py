@@ -233,14 +233,15 @@ class ConvoyRun:
     Args:
         experiment: description of the experiment: its robots, and the changes that are planned for
             the run (`Experiment.acts`).
-        echo: function that is called with a line of the table every 2 s.
+        echo: function that prints a line of text. Every 2 s it gets a line with the positions of
+            the robots.
         clock: clock of a run in real time, or None for a run in virtual time.
 
     Attributes:
         convoy: the robots and their components.
         tracks: tracks of the robots, in the order of their numbers.
-        marks: changes during the run up to now, mostly of connectors. The picture marks each change
-            with a number.
+        marks: changes during the run up to now. Most changes connect or disconnect ports of
+            components. The picture marks each change with a number.
     """
 
     def __init__(self, experiment: Experiment, echo: _Echo, clock: RealClock | None = None) -> None:

@@ -167,10 +167,12 @@ def _draw(
 
 
 def show_fig120(plot: Path | None, **options: Any) -> None:
-    """Run the demonstration of Fig. 120 in the terminal, and draw its curves if a file is given.
+    """Run the demonstration `tickrig demo fig120` in the terminal.
+
+    In this demonstration a potentiometer turns a motor without a PC in between.
 
     Args:
-        plot: path of the picture, or None.
+        plot: path of a picture with the curves of the run, or None to draw no picture.
         options: options of the bus.
     """
     if plot is not None:

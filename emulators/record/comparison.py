@@ -89,6 +89,9 @@ def _split_numbers(text: str) -> tuple[str, list[float]]:
 def parse_number_rule(text: str) -> NumberRule:
     """Parse a number tolerance: `PATTERN=TOLERANCE` or `PATTERN[FROM:TO]=TOLERANCE`.
 
+    PATTERN selects lines or frames. FROM and TO are the first position and the end of the number in
+    them. Positions count the characters of a line, or the data bytes of a frame.
+
     A tolerance that ends in `%` is a percentage of the recorded number.
 
     Raises:
@@ -111,12 +114,12 @@ class Tolerance:
     """Allowed deviations of an emulated run from a recorded run.
 
     Attributes:
-        time_us: allowed deviation of a time in microseconds, without drift. The method `allowed_us`
-            adds the largest drift between two clocks, which grows with the duration of the run.
+        time_us: allowed deviation of a time at the start of the run, in microseconds. Later in the
+            run the method `allowed_us` adds the largest drift between two clocks.
         numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
-        kinds: patterns of lines that are independent of all other lines. The emulator may send such
-            a line earlier or later than other lines, in an order that differs from the recording.
+        kinds: patterns, each for one kind of lines. The order of lines is compared only within a
+            kind, so the emulator may send such lines earlier or later than lines of other kinds.
     """
 
     time_us: int

@@ -83,17 +83,14 @@ class FrameFormat(Immutable):
     answer: FrameFields | None = None
 
     def described(self, request: FrameFields, answer: FrameFields | None = None) -> FrameFormat:
-        """Return a copy of the rule with which logs show the fields of each frame.
+        """Return a copy of this rule. A log with the copy shows the fields of each frame.
 
         Args:
-            request: function that gets a frame of the host, and returns its fields by name. An
-                object with such a method `parse` is accepted, too, for example a Struct of
-                construct. An invalid frame raises an exception.
-            answer: function that gets a frame of the device, and returns its fields in the same
-                way. The default is `request`.
-
-        Returns:
-            The copy of the rule.
+            request: function that gets a frame of the host, and returns its fields by name. The
+                function raises an exception for an invalid frame. An object with a method `parse`
+                that does this is accepted, too, for example a Struct of the library construct.
+            answer: function or object that does this for a frame of the device. The default is
+                `request`.
         """
         return replace(self, request=request, answer=answer or request)
 

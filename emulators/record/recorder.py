@@ -257,8 +257,8 @@ class Tick(NamedTuple):
         done: actions before the tick, such as `stick=5`.
         received: bytes or frames that the device received.
         sent: bytes or frames that the device sent.
-        mark: mark of the actions in the trace. If the mark is `~`, `name` is the name of a wire,
-            otherwise the name of a device.
+        mark: mark of the actions in the trace: `!` if `name` is the name of a device, `~` if `name`
+            is the name of a wire.
     """
 
     at_us: int
@@ -327,8 +327,9 @@ class TraceRecorder(Copyable):
 
         Args:
             name: name of the device in the header.
-            device: the device. From its first tick on, the recording has its traffic, the changes
-                of its `inputs`, and the changes of objects that a CANopen node sets itself.
+            device: the device. From its first tick on, the traffic of the device and the changes of
+                its `inputs` are recorded. For a CANopen node, each object that is set by name is
+                recorded, too.
 
         Raises:
             KeyError: the header has no such device.

@@ -80,7 +80,7 @@ class WireLog:
         only when the next traffic arrives.
 
         Args:
-            rig: the rig whose time ends the silence.
+            rig: the rig with the line. Its time shows when a silence is long enough.
             name: name of the serial line.
         """
         logs = self._splitters.values()
@@ -123,9 +123,8 @@ class WireLog:
         """Return the incomplete line or frame of each direction, as an entry with the number 0.
 
         Args:
-            by_gap: choice of the lines and frames: true for the frames that end by a silence, false
-                for all other lines and frames. A frame that ends by a silence may already be
-                complete.
+            by_gap: whether to return only the frames that a silence ends. Such a frame may already
+                be complete. With false all other lines and frames are returned.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

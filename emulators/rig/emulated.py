@@ -45,7 +45,15 @@ class Inputs(Protocol):
         ...
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; raise ValueError if none has this name and type."""
+        """Return the description of an input.
+
+        Args:
+            name: name of the input.
+            signal_type: required type of the input, or None to accept any type.
+
+        Raises:
+            ValueError: no input has this name, or the input has another type.
+        """
         ...
 
 

@@ -125,7 +125,7 @@ EITHER_WAY: Final = replace(WAY, default="both", bare=False)
 
 @dataclass(frozen=True, slots=True)
 class FaultForm(Immutable):
-    """Description of a fault and its arguments; the entries of fault tables are subclasses.
+    """Description of a fault and its arguments.
 
     Attributes:
         text: description of the fault as readable text.
@@ -481,7 +481,8 @@ class FaultType(FaultForm, Generic[W]):
     """Type of a wire fault, which can be armed by its name at a port.
 
     Attributes:
-        make: function that makes the fault of one direction from its trigger and its arguments.
+        make: function that gets a trigger and the arguments of the fault. It returns the fault,
+            which changes the traffic in one direction.
         uart_error: error that a UART detects each time the fault acts: `framing`, `parity`,
             `breaks`.
     """

@@ -106,11 +106,11 @@ if TYPE_CHECKING or _KERNEL is None:
 
         Args:
             rig: the rig.
-            parts: the parts of the rig that the kernel uses: timetable, bus, event queue,
-                `Horizon`, watchers, hosts and stations (devices at their ports).
+            parts: the parts of the rig that the kernel uses, such as the event queue and the
+                devices at their ports.
             until_us: end of the run, in microseconds.
-            unseen_us: time until which probably no code reads a device, in microseconds. Up to this
-                time a device may compute several ticks in advance.
+            unseen_us: time in microseconds. Before this time probably no code reads a device, so a
+                device may compute several ticks in advance.
             host: end of a wire at which a host waits for traffic, or None if no host waits.
 
         Returns:

@@ -79,11 +79,11 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def arrival_us(self, count: int) -> int:
-        """Return the time at which `count` bytes will have arrived at this end.
+        """Return the time at which to check whether `count` bytes have arrived at this end.
 
-        If this time is not known yet, the result is the time at which to call this method again, or
-        `NEVER`. The result does not show which of the two times it is. Therefore the caller counts
-        the bytes at the returned time, and calls this method again if bytes are missing.
+        If the arrival time is known, the result is this time. Otherwise the result may be an
+        earlier time, or `NEVER`. If bytes are missing at the returned time, the caller calls this
+        method again.
         """
         ...
 

@@ -137,7 +137,7 @@ class _Wires(Part):
 
     @property
     def only_bus(self) -> Any:
-        """The CAN bus of the only wire, for the compiled kernel, or None with several wires."""
+        """The CAN bus, for the compiled kernel, or None unless it is the only wire of the rig."""
         return getattr(self._wires[0], "_kernel_bus", None) if len(self._wires) == 1 else None
 
     @property
@@ -371,8 +371,8 @@ class Rig(Copyable):
     def snapshot(self, *parts: object) -> MachineSnapshot:
         """Return a snapshot that can restore the present state of the rig any number of times.
 
-        The snapshot restores this rig itself, so references to the ends of its wires stay valid. A
-        snapshot is made in a twentieth of the time of a copy by `fork`.
+        The snapshot restores this rig itself, so references to the ends of its wires stay valid.
+        Making a snapshot is about 20 times as fast as making a copy by `fork`.
 
         Args:
             parts: further objects that are restored with the rig, such as a host.
@@ -433,10 +433,9 @@ class Rig(Copyable):
         Args:
             t_us: end of the run, in microseconds since the start of the rig.
             host: host whose traffic ends the run early, or None to run to the end.
-            unseen_us: duration in microseconds, which begins at `t_us`. The caller will probably
-                not read devices or set inputs between ticks in this time. The duration only makes
-                the run faster: if the caller does read devices or set inputs, the result is right,
-                too.
+            unseen_us: hint that makes the run faster: for this time after `t_us`, in microseconds,
+                the caller will probably not read devices or set inputs between ticks. If the caller
+                does so, the result is right, too.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):

@@ -89,13 +89,13 @@ class Looks(Copyable):
 
 
 class HostLimit(Copyable):
-    """Base class for a limit on the waits of hosts. Only subclasses set a limit.
+    """Base class for a limit on the waits of hosts, so that no host waits endlessly.
 
-    A host waits by advancing the time of the rig. If the present time is `due_us` or later when a
-    wait begins, the port of the host calls `count`, so that the wait is counted.
+    This class itself sets no limit. If a host begins a wait at `due_us` or later, the port of the
+    host calls `count`.
 
     Attributes:
-        due_us: time in microseconds. A wait of a host that begins before this time is not counted.
+        due_us: time in microseconds. A wait that begins before this time is not counted.
     """
 
     due_us: int = NEVER
@@ -111,8 +111,8 @@ class HostLimit(Copyable):
 
         Args:
             now_us: present time in microseconds.
-            where: function that returns file and line of the waiting code, for the message. The
-                default is the line of the host.
+            where: function that returns file and line number of the waiting code, for the message.
+                By default the code of the host is found.
 
         Raises:
             AssertionError: the limit is reached.

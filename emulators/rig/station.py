@@ -17,11 +17,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class WirePort(Protocol[W]):
-    """Protocol of a `Port` that reports the arrival of traffic, so that the rig need not poll it.
-
-    `WirePort` is not derived from `Port`: a compiled base class has additional names, which would
-    become members of the protocol.
-    """
+    """Protocol of a `Port` that reports the arrival of traffic, so that the rig need not poll it."""
 
     @property
     def wire(self) -> Wire:

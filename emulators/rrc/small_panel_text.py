@@ -44,7 +44,7 @@ def controls_pane(view: PanelView) -> Text:
 
 
 def report_line(view: PanelView) -> Text:
-    """Return the latest SA line for the panel, with the counters of speed and alarm buttons."""
+    """Return the latest status `SA` of the RRC as a line of the panel."""
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(

@@ -159,10 +159,9 @@ class HostEnd:
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return the time at which `count` bytes will have arrived at this end.
+        """Return the time at which to check whether `count` bytes have arrived at this end.
 
-        If this time is not known yet, the result is the time at which to call this method again, or
-        `NEVER`.
+        If bytes are missing at this time, the caller calls this method again.
         """
         return self._end.arrival_us(count)
 

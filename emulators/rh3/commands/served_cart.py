@@ -110,7 +110,7 @@ class CartControl(SystemControl):
     Args:
         connection: connection to the base, with the RT components. While a request is answered, the
             time of the connection must not advance.
-        cart: object that advances the cart.
+        cart: the running cart.
     """
 
     def __init__(self, connection: BaseConnection, cart: ServedCart) -> None:
@@ -170,10 +170,17 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
     Lines typed on standard input are commands of the component PositionInput. When standard input
     ends and no other program can reach the cart, the run ends after the last command.
 
-    If velocities come from a topic, the cart follows them while no command of PositionInput runs.
+    Another program can send velocities to the cart, for example on a topic of ROS 2. The cart
+    follows these velocities while no command of PositionInput runs.
+
+    Args:
+        options: options of the cart and its base.
+        engines: connections to OpenRTM and ROS 2.
+        control: path of the control socket, or None for no control socket.
 
     Raises:
-        Refused: there is no cart, or an engine or control socket cannot be opened.
+        Refused: there is no cart, or the connection to OpenRTM or ROS 2 or the control socket
+            cannot be opened.
     """
     clock = CartClock()
     connection = replace(options, clock=clock).begin()

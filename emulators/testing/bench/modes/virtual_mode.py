@@ -114,8 +114,8 @@ class _WaitLimit(HostLimit):
 
         Args:
             now_us: present time in microseconds.
-            where: function that returns file and line of the wait. The default is the line of the
-                host.
+            where: function that returns file and line number of the waiting code, for the message.
+                By default the code of the host is found.
 
         Raises:
             HostHangsError: the limit is reached.
@@ -133,6 +133,8 @@ class _WaitLimit(HostLimit):
         self, now_us: int, what: str = "read the clock", where: Callable[[], str] | None = None
     ) -> None:
         """Count a read of the clock by a host, or a wait that took no time.
+
+        A host that repeats only these hangs, because they do not advance the time.
 
         Raises:
             HostHangsError: there were too many such reads and waits.
