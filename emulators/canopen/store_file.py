@@ -44,7 +44,7 @@ class StoreFile:
     def nonvolatile(self, name: str, dictionary: Dictionary) -> Nonvolatile:
         """Return the non-volatile memory of a node, as read from the file.
 
-        The memory of a new node is empty. The node writes the values that it stores into this memory.
+        The memory of a new node is empty. The node writes its stored values into this memory.
         If the EDS has changed, values that do not fit the dictionary are dropped.
 
         Args:

@@ -17,7 +17,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class WirePort(Protocol[W]):
-    """Protocol of a `Port` that reports the arrival of traffic, so that the rig need not poll it."""
+    """Protocol of a `Port` that reports the arrival of traffic, so the rig need not poll it."""
 
     @property
     def wire(self) -> Wire:

@@ -102,7 +102,7 @@ class Bridge:
 
         The exact time at which a host has written data is not known: it is after the last poll and
         before this poll. The data are sent as if the host had written them right after the last
-        poll. If they were sent as of this poll, each poll would delay data by up to a tick.
+        poll, so that the poll does not delay them.
         """
         if self._pending:
             self._attend(now_us)
@@ -218,9 +218,8 @@ class HostEnd:
 class Tap(Copyable, Generic[W]):
     """Wrapper of a port that reports all its traffic to listeners.
 
-    The port may be the device's end of a wire, or the port of the host. In both cases `poll`
-    returns the data that go to the device, and `send` forwards the data that come from the device.
-    A copy of the wrapper has no listeners.
+    The wrapped port is a port of the device: `poll` returns the data that go to the device, and
+    `send` forwards the data that come from the device. A copy of the wrapper has no listeners.
 
     Args:
         port: the wrapped port.

@@ -11,9 +11,10 @@ class Serial(SimSerial):
     """pyserial port for a URL `tickrig://NAME`, which `serial.serial_for_url` opens.
 
     The name in the URL is looked up when the port is opened. As with any pyserial port, the default
-    setting is 9600 8N1, whatever the device uses. If the settings of port and device differ, the
-    option `?mismatch=errors` or `?mismatch=refuse` of the URL selects what happens. For a URL
-    without this option, the `mismatch` applies that was chosen when the name was offered to hosts.
+    setting is 9600 8N1, whatever the device uses. The option `mismatch` of the URL selects what
+    happens if the settings of port and device differ. With `?mismatch=errors` characters arrive
+    wrong, and with `?mismatch=refuse` an exception is raised. The default is the `mismatch` of the
+    `SerialSide` that was offered under the name.
 
     Args:
         port: URL, which is opened at once, or None to open the port later.

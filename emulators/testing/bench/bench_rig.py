@@ -96,9 +96,8 @@ class Journal(WireLog):
 
         Args:
             source: name of the line or node.
-            ends: two words for the text of an entry, such as `host` and `device`. The first word
-                names the side that sends traffic to the device, the second word names the side that
-                receives this traffic.
+            ends: names of the two sides of the wire in the text of an entry: first the other side,
+                then the side of the device or node, such as `host` and `device`.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """
@@ -170,12 +169,10 @@ class Journal(WireLog):
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return the kept lines in order of time.
+        """Return the kept entries of the journal in order of time.
 
-        On some lines a frame ends by a silence. The last frame of such a line is included, although
-        it may not be complete yet. The order of time can differ from the order in which lines were
-        added: an action is added at once, but has the time of the next tick of its device. A frame
-        that ends before this tick is added later.
+        On some serial lines a frame ends by a silence. The last frame on such a serial line is
+        included, although it may not be complete yet.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))
@@ -241,8 +238,9 @@ class BenchOperator(Operator):
     def full_name_of(self, name: str) -> str:
         """Return the name under which the bench has a fault.
 
-        The given name may begin with a device or wire, as `DEVICE/FAULT`. This beginning is removed
-        if the bench has the fault only without it.
+        Args:
+            name: name of the fault: `FAULT`, `DEVICE/FAULT` or `WIRE/FAULT`. If the bench has the
+                fault only as `FAULT`, the result is `FAULT`.
         """
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
@@ -258,11 +256,12 @@ class Parts:
 
     Attributes:
         mounts: wires with their devices.
-        bodies: mechanical bodies that drives move. The bench also treats each body as a device,
-            with the name `body`.
+        bodies: mechanical bodies, which are moved by motor drives. The bench also treats each body
+            as a device, with the name `body`.
         start: initial values of inputs, by device and name.
-        signals: values that change with time. The key is the input that the signal drives, as
-            `DEVICE/INPUT`, or a name that formulas use.
+        signals: values that change with time. The key `DEVICE/INPUT` is an input, whose value the
+            signal sets. Any other key is a name, under which other signals use the value in their
+            formulas.
         stores: files with stored parameters of nodes, which are saved while time passes.
         seed: seed of all random numbers.
     """

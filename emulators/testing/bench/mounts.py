@@ -61,8 +61,8 @@ class LineMount(Copyable):
         Args:
             name: name of the device.
             device: the device.
-            entry: description of the device for the header of a trace, if a replay can make the
-                device from it.
+            entry: description of the device in the header of a trace, from which a replay makes the
+                device. With None a replay cannot make the device.
             seed: seed of random faults at the device's end.
 
         Raises:
@@ -137,8 +137,8 @@ class BusMount(Copyable):
         Args:
             name: name of the node.
             slave: the slave.
-            entry: description of the slave for the header of a trace, if a replay can make the
-                slave from it.
+            entry: description of the slave in the header of a trace, from which a replay makes the
+                slave. With None a replay cannot make the slave.
         """
         node = self.nodes[name] = late.Node(name, slave, self.wire)
         self.node_faults[name] = late.NodeFaults(node, self.wire)

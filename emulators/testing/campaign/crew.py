@@ -166,10 +166,10 @@ class Crew:
     A new process is started if none is idle.
 
     Args:
-        order: the tests that each worker collects.
+        order: options by which each worker collects and runs the tests.
 
     Attributes:
-        order: the tests, as given.
+        order: options by which each worker collects and runs the tests.
     """
 
     def __init__(self, order: CampaignOrder) -> None:
@@ -272,8 +272,6 @@ class Crew:
 
 class LocalWorkers:
     """Runs the tests of a campaign in several processes of this machine.
-
-    A thread waits for each process.
 
     Args:
         crew: the processes, which have collected the tests.

@@ -195,7 +195,11 @@ class _CampaignOptions:
 
     @property
     def output_paths(self) -> tuple[Path, ...]:
-        """Paths of the campaign's tables; the default name has the number of the part, if any."""
+        """Paths of the campaign's tables.
+
+        The default is `campaign.csv`. If the campaign is divided into 4 parts, the default for its
+        part 2 is `campaign-2-of-4.csv`.
+        """
         shard = Shard.parse(self.shard)
         part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
         return self.outputs or (Path(f"campaign{part}{_CSV}"),)

@@ -132,7 +132,7 @@ class SlaveBench:
             `power`, because the bench switches the supply itself.
 
     Attributes:
-        source: the slave in the form in which the conformance tester tests it.
+        source: the open bus with the slave, for the conformance tester.
     """
 
     def __init__(self, slave: Slave, bit_rate: int, stimulus: Stimulus | None = None) -> None:

@@ -86,11 +86,11 @@ class CalledSlave:
     """A slave for the conformance tester, made from a function that is called each millisecond.
 
     Args:
-        make: function that makes the callable, in its state after power-on. It is called again at
-            each power-on.
+        make: function without arguments. It returns the function that is called each millisecond,
+            in its state after power-on. `make` is called again at each power-on.
 
     Raises:
-        ValueError: `make` does not return a callable.
+        ValueError: `make` does not return such a function.
     """
 
     tick_us: int = TICK_US
@@ -119,10 +119,10 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Return whether an object is itself the function to call each millisecond.
+    """Return whether an object can be called only with arguments: a time and frames.
 
-    `CalledSlave` refuses such an object, because it needs a function that makes a new object at
-    each power-on.
+    Such an object is the function of a slave for each millisecond. `CalledSlave` refuses it,
+    because its argument `make` is called without arguments.
     """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 

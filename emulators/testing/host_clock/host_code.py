@@ -35,10 +35,7 @@ class UnpatchedTimeError(HostTimeError):
 
 
 class HostHangsError(AssertionError):
-    """Raised if a host does not return, because it waits longer than the bench allows.
-
-    In a search for failures, the `BenchMachine` sets this limit.
-    """
+    """Raised if a host does not return, because it waits longer than the bench allows."""
 
     __module__ = "tickrig"
 

@@ -63,7 +63,13 @@ def check_host(
 def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | None = None) -> Any:
     """Return a Hypothesis test that searches for failures of a host.
 
-    The test executes random steps, which Hypothesis chooses, with `runs`.
+    Hypothesis chooses the steps of each run at random.
+
+    Args:
+        runs: object that executes the steps.
+        max_examples: number of runs, if no failure is found.
+        max_steps: largest number of steps in a run.
+        seed: seed of the random choices, or None for a different search each time.
 
     Raises:
         ModuleNotFoundError: Hypothesis is not installed.

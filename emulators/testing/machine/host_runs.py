@@ -248,11 +248,11 @@ class HostFailure:
 
     Attributes:
         error: exception that was raised.
-        violated: part of the machine that raised the exception, such as `invariant it_is_slow`,
-            `rule drive`, `connect`, `end`.
+        violated: part of the machine that failed: an invariant such as `invariant it_is_slow`, a
+            rule such as `rule drive`, or the method `connect` or `end`.
         at_us: time of the failure on the bench, in microseconds.
         steps: steps of the run before the failure.
-        passed: last traffic before the failure, as text.
+        passed: last traffic that passed over the wires before the failure, as text.
     """
 
     error: BaseException

@@ -86,11 +86,10 @@ def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrat
 def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
     """Return a Hypothesis strategy for traffic of hosts other than the host under test.
 
-    Each drawn value is a `step`; `step.do(bench)` sends its traffic.
+    Each drawn value is a `HostStep`. Its method `do(bench)` sends the traffic.
 
     Args:
-        words: traffic to draw from: frames in candump's notation, or bytes in hex, as in
-            `HostStep.what`.
+        words: texts to draw from. Each text is a frame in candump's notation, or bytes in hex.
     """
     return st.builds(HostStep, timing(), st.just("send"), st.sampled_from(words))
 

@@ -88,10 +88,9 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return a copy of this request from which the bench of a test can be opened.
+        """Return a copy of this request with devices for one test, to open the bench of the test.
 
-        No other test has used the devices of the copy. The files of devices are found relative to
-        `folder`.
+        Relative paths of the files of devices start from `folder`.
 
         Args:
             item: the test.
@@ -218,7 +217,9 @@ def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
 
 
 def allowed_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names that a test gives to its markers `allows`, such as `lost`.
+    """Return the problems that a test permits by its markers `allows`.
+
+    Each problem is a name. For example, `allows("lost")` permits lost data.
 
     Raises:
         ValueError: a name is unknown.
@@ -262,7 +263,7 @@ def check_needs(needs: Iterable[str], bench: Bench) -> None:
 
     Raises:
         NotOnThisBench: the bench lacks something.
-        ValueError: a name is misspelt, so that every bench would skip the test.
+        ValueError: a name is probably misspelt: the bench has a similar name.
     """
     for need in needs:
         lacks = [_lack(choice, bench) for choice in need.split(_OR)]
@@ -345,10 +346,11 @@ SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
 def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
     """Run the warm-up of a test on its bench, and return the bench for the test.
 
-    In virtual time a bench may be kept after its warm-up, for later runs of the same test in a
-    campaign. A later run gets a copy of the kept bench, and needs no warm-up of its own. This
-    requires that the kept bench was equal to `bench` before the warm-up, except for the seed, and
-    that the warm-up drew no random numbers. Hosts, triggers and tasks of the warm-up are removed.
+    A campaign runs a test several times. In virtual time the bench may be kept after the warm-up of
+    the first run. Then a later run gets a copy of the kept bench without a warm-up. A bench is not
+    kept if its warm-up drew random numbers. The copy is not used if `bench` differs from the kept
+    bench before its warm-up in more than the seed. Hosts, triggers and tasks of the warm-up are
+    removed.
 
     Raises:
         ValueError: the bench cannot be copied after the warm-up, although it could be copied

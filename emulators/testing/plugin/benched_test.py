@@ -140,7 +140,7 @@ class _BenchedTest(TestWithBench):
     def close(self) -> None:
         """Close the bench of the test.
 
-        A passed test fails if an error has occurred since the end of its body.
+        If the body of the test has passed but an error has occurred since, the test fails.
         """
         since = self.take_unheard() if self._passed else []
         with self._stack:

@@ -66,10 +66,10 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
 
 
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
-    """Yield each line of a bench's journal and its text, in which a CAN frame is decoded.
+    """Yield each line of a bench's journal with its text; the text of a CAN frame is decoded.
 
-    PDOs are decoded with their mapping, even if the host wrote the mapping so early that the
-    journal no longer has this line.
+    PDOs are decoded by the mapping that the host wrote, even if the journal no longer has the lines
+    with the mapping.
     """
     meanings, buses = decoder.Decoder(), buses_of(bench)
     for line in bench._mode.mappings():

@@ -292,8 +292,8 @@ class DeviceChecks:
         bench: function that makes a bench with one device.
         remembers: whether the device keeps more than its configuration and inputs when it is reset,
             for example stored parameters.
-        pauses: whether to check that pauses within a word of the host do not change the answers of
-            the device. The value is false if a pause ends a frame.
+        pauses: whether to check that the answers of the device do not change if the host pauses
+            within a message. The value is false for a device whose frames end by a pause.
     """
 
     def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:

@@ -175,8 +175,8 @@ def difference(
         device: the device with the outputs.
         one: observations of one run.
         other: observations of the other run.
-        first: words about the first run. In the result they follow the value from this run.
-        second: words about the other run. In the result they follow the value from this other run.
+        first: name of the run `one` in the description, such as `dense`.
+        second: name of the run `other` in the description, such as `sparse`.
     """
     names = [_SENDS, *getattr(device, "outputs", ())]
     for (at_us, *seen), (_, *others) in zip(one, other, strict=True):

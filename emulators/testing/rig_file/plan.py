@@ -90,16 +90,14 @@ class DeviceKind(Enum):
 
 
 class MadeDevice:
-    """Keeps the device that was made in order to check a rig file, for use by the first bench.
-
-    Thus the device need not be made twice.
+    """Keeps a device that the check of a rig file has made; the first bench uses this device.
 
     A copy of this object, in this process or in another process, does not contain the device.
 
     Args:
         device: device made by `configure`, or a CANopen slave, or None if no device is kept.
-        of: parameters with which the device was made. A bench gets the device only if the
-            parameters that the bench needs are equal to these.
+        of: parameters with which the device was made. A bench gets the device only if it needs a
+            device with equal parameters.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:
@@ -153,8 +151,7 @@ class DevicePlan:
     def made_of(self, seed: int = 0) -> tuple[object, ...]:
         """Return the parameters with which the described device is made.
 
-        If a device was made earlier with equal parameters (`MadeDevice`), it can be used as the
-        described device.
+        `MadeDevice` compares these parameters with the parameters of the device that it keeps.
 
         Args:
             seed: seed of all random numbers, for a device on a serial line.

@@ -36,7 +36,8 @@ class Probe:
 
     Attributes:
         physical: inputs and outputs of the device.
-        wire_faults: faults of the wire at the end of the device, or faults of the CAN bus.
+        wire_faults: faults of the wire to the device. For a CANopen node these are the faults of
+            the CAN bus.
         title: name of the device in messages.
         baud: baud rate of the type of a serial device.
         node_id: node-ID of a CANopen node, from its DCF or model.

@@ -76,9 +76,10 @@ class _SignalScope:
         A signal is returned as its name. Otherwise the result is an input or output of a device.
 
         Args:
-            name: name as in a formula: a signal, an input or output of the owner's device,
+            name: name as in a formula: a signal, an input or output of the device in `owner`,
                 `DEVICE.NAME`, or `DEVICE/NAME` in quotes.
-            owner: name of the signal that has the formula.
+            owner: name of the signal that has the formula. If the signal sets the input of a
+                device, the name is `DEVICE/INPUT`.
         """
         own, slash, _ = owner.partition(SLASH)
         full = name if SLASH in name else name.replace(".", SLASH, 1)

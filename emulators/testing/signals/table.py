@@ -62,9 +62,9 @@ def read_points(path: Path, column: str | None) -> _Points:
 
     Args:
         path: path of a CSV file, a trace, or a CAN log. The suffix selects the format.
-        column: name of a column of a CSV file, name of an input of a trace, or description of the
-            bits of a frame in a CAN log, such as `181[2:6]s*0.001`. None selects the only column
-            besides the times of a CSV file.
+        column: name of a column of a CSV file, name of an input of a trace, or bits of a frame in a
+            CAN log. For example, `181[2:6]s*0.001` means bytes 2 to 5 of frame 181h, signed, times
+            0.001. None selects the only column besides the times of a CSV file.
 
     Raises:
         ValueError: the file cannot be read, has no such column, or has no value in this column.

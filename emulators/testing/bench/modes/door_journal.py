@@ -112,7 +112,7 @@ class DoorJournal(Journal):
         """Return a monitor that adds the traffic of a host's connection to the journal.
 
         Args:
-            mount: wire of an equivalent emulated bench.
+            mount: the wire, on an emulated bench with the same devices.
             pace: monitor that measures how late the host is.
         """
         if isinstance(mount, LineMount):
@@ -173,13 +173,13 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Note that a connection has recorded frames, so that no other connection records them.
+        """Mark frames as recorded by a connection, so that no other connection records them.
 
         Args:
             wire: name of the bus.
             watch: monitor of the connection that has recorded the frames.
             frames: the recorded frames.
-            by: value 1 to note the frames, or -1 to withdraw this note because the frames could not
+            by: value 1 to add the mark, or value -1 to remove the mark because the frames could not
                 be sent.
         """
         with self._lock:

@@ -30,9 +30,10 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Measures the delays of a host: how much too late its waits at a connection ended.
+    """Measures how much too late the waits of a host at a connection end.
 
-    Subclasses override `passed` to get the traffic of the connection.
+    The connection calls the methods when the host waits, sends or receives. A subclass can override
+    `passed` to get the traffic of the connection.
 
     Attributes:
         late_us: largest delay up to now, in microseconds.
@@ -271,11 +272,11 @@ class CpuWaits:
 
     Args:
         tasks: path of the folder with the threads.
-        spares_looker: whether to omit the calling thread, which measures its own delay.
+        spares_looker: whether to omit the thread that calls `look`.
 
     Attributes:
-        worst_us: longest wait of a thread up to now in microseconds. The waits of a thread are
-            added up from one update to the next, over about `_LOOK_US`.
+        worst_us: longest time that a thread has waited between two updates by `look`, up to now,
+            in microseconds.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:

@@ -578,14 +578,14 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return a function that starts a fault; its argument is the time of the bench.
+        """Return a function that gets the present time of the bench, and starts a fault.
 
         Args:
             owner: name of the device or wire with the fault, or empty if the fault may belong to
                 any.
-            order: requested fault. In `order.spec`, this method replaces a short name of the fault
-                by the full name. A human is too slow for a fault that begins when a condition is
-                true, so such a fault needs an emulator as the operator.
+            order: requested fault. This method writes the full name of the fault into `order.spec`.
+                If the fault begins when a condition is true, the operator must be an emulator,
+                because a human is too slow.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)

@@ -255,10 +255,9 @@ class RealMode(EmulatedMode):
     The time starts with the first connection of a host or the first wait.
 
     Args:
-        rig: rig with the devices. The rig must have the clock and the bridges that `outside`
-            contains.
-        outside: connections at which hosts find the wires, with a clock and with bridges for the
-            rig. The connections are closed at the end.
+        rig: rig with the devices. It must use the clock and the bridges of the argument `outside`.
+        outside: connections of the wires for hosts outside the rig, with a clock and bridges. The
+            connections are closed at the end.
     """
 
     name = "real"
