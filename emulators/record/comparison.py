@@ -119,7 +119,8 @@ class Tolerance:
         numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
         kinds: patterns, each for one kind of lines. The order of lines is compared only within a
-            kind, so the emulator may send such lines earlier or later than lines of other kinds.
+            kind. So the emulator may send lines of different kinds in another order than the
+            recording.
     """
 
     time_us: int

@@ -83,12 +83,12 @@ class FrameFormat(Immutable):
     answer: FrameFields | None = None
 
     def described(self, request: FrameFields, answer: FrameFields | None = None) -> FrameFormat:
-        """Return a copy of this rule. A log with the copy shows the fields of each frame.
+        """Return a copy of this frame format; a log with the copy shows the fields of frames.
 
         Args:
             request: function that gets a frame of the host, and returns its fields by name. The
-                function raises an exception for an invalid frame. An object with a method `parse`
-                that does this is accepted, too, for example a Struct of the library construct.
+                function raises an exception for an invalid frame. An object whose method `parse`
+                does this is accepted, too, for example a Struct of the library construct.
             answer: function or object that does this for a frame of the device. The default is
                 `request`.
         """

@@ -96,8 +96,8 @@ class Journal(WireLog):
 
         Args:
             source: name of the line or node.
-            ends: names of the two sides of the wire in the text of an entry: first the other side,
-                then the side of the device or node, such as `host` and `device`.
+            ends: two names for the text of an entry, such as `host` and `device`. The second name
+                is for the device or node, the first name is for the other side of its wire.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """

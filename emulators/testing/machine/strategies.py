@@ -89,7 +89,8 @@ def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
     Each drawn value is a `HostStep`. Its method `do(bench)` sends the traffic.
 
     Args:
-        words: texts to draw from. Each text is a frame in candump's notation, or bytes in hex.
+        words: texts to draw from. Each text is a frame in candump's notation, or bytes in hex; see
+            `HostStep.what`.
     """
     return st.builds(HostStep, timing(), st.just("send"), st.sampled_from(words))
 

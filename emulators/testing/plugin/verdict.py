@@ -68,9 +68,9 @@ def blocked(
 def is_mistake(error: BaseException) -> bool:
     """Return whether an error is a mistake in the test, which would occur on a fast machine, too.
 
-    A misspelt name is such a mistake, and so is a call that the bench refuses. An error of the test
-    because a value is None is not a mistake: a message may not have arrived in time. An exception
-    that the host itself raises is not a mistake either.
+    A misspelt name is such a mistake, and so is a call that the bench refuses. If the test fails
+    because a value is None, this is not a mistake: a message may not have arrived in time. An
+    exception that the host itself raises is not a mistake either.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))
