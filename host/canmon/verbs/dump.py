@@ -232,13 +232,13 @@ def dump(  # noqa: PLR0913 - options
         if reopen or (recording is not None and recording.plan.numbered):
             frames.reopen()
         if recording is not None:
-            log = LogFile(recording.plan, source, frames.live, recording.triggers, kept)
-            held.enter_context(closing(log))
-            take = log.take
+            keys = None
             if recording.plan.around is not None:
                 keys = _TriggerKeys("-" not in source)
-                held.enter_context(keys.watching())
-                take = _with_keys(log, keys)
+                held.enter_context(keys.watching())  # before there is a file: it is a sign to send
+            log = LogFile(recording.plan, source, frames.live, recording.triggers, kept)
+            held.enter_context(closing(log))
+            take = log.take if keys is None else _with_keys(log, keys)
         with until_interrupted() as signals, until_unread():
             # a block of a log is written whole; who prints may wait for its reader for ever
             whole = take if recording is None else signals.behind(take)

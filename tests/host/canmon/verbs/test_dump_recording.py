@@ -20,6 +20,8 @@ from click.testing import CliRunner, Result
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
+from tickrig.host.canmon.output.recording import LogFile
+from tickrig.host.canmon.verbs import dump
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 PATIENCE_S = 20.0
@@ -287,6 +289,25 @@ def test_a_signal_is_a_trigger(feeding: Callable[..., Feeding], tmp_path: Path) 
     assert recorder.end() == 0
     assert numbers(tmp_path, "run-*.log") == list(range(994, 1_010))
     assert "trigger: SIGUSR1" in (tmp_path / "run-00001.log").read_text()
+
+
+def test_a_signal_may_come_as_soon_as_there_is_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Signalled(LogFile):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            signal.raise_signal(signal.SIGUSR1)
+
+    monkeypatch.setattr(dump, "LogFile", Signalled)
+    words = ["-l", str(tmp_path / "run.log"), "--pre", "5", "--post", "1h"]
+    before = signal.signal(signal.SIGUSR1, signal.SIG_IGN)  # a signal that came too early
+    try:
+        assert canmon("dump", write_run(tmp_path, 10), *words).exit_code == 0
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    marks = index_of(tmp_path / "run.index.jsonl")
+    assert [mark["text"] for mark in marks if mark["ev"] == "trigger"] == ["trigger: SIGUSR1"]
 
 
 @pytest.mark.realtime
