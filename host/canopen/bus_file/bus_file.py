@@ -30,7 +30,7 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file import bus_checks
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusMaster, BusSlave, Identity
-from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
+from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, SLAVE, check_keys
 from tickrig.host.canopen.bus_file.layout import Layout, read_layout
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileNotes, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import CobIds, pdos_after
@@ -318,6 +318,7 @@ class _Reader:
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, name: str, node: BusFileSection, master: BusMaster | None) -> BusSlave | None:
+        check_keys(node, SLAVE, open_to_others=True)
         sheet = self._sheets.find(node)
         if sheet is None:
             return None

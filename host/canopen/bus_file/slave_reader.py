@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusSlave, DriveChannel, Identity
-from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, SLAVE, check_keys
+from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, UNSIGNED32, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes
@@ -47,7 +47,6 @@ class SlaveReader:
         which dcfgen writes them.
         """
         node, sheet = self._node, self._sheet
-        check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()
         slave = BusSlave(
             self._name, sheet.node_id, node.place, sheet.path, sheet.device, self._identity()

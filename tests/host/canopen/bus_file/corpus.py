@@ -178,6 +178,8 @@ CORPUS: Final = (
     Case("file-elsewhere", NODE.replace("epos", "install/epos"), 4, "using the file in "),
     Case("not-whole", NODE + "  heartbeat_producer: 10.5\n", 5, "10.5 is cut off: 10"),
     Case("flag-text", NODE + "  boot: 'no'\n", 5, "'no' is not true or false: true is taken"),
+    Case("unknown-key", MASTER + "axis: {dcf: epos.eds, noode_id: 5}\n", 2, "'node_id'?", False),
+    Case("unknown-key", MASTER + "axis: {dfc: epos.eds, node_id: 5}\n", 2, "'dcf'?", False),
     Case("unknown-key", NODE + "  heartbeat_prodcer: 5\n", 5, "did you mean 'heartbeat_producer'?"),
     Case(
         "unknown-key", SLEEPY + "  sdo: [{index: 0x2000, value: 1, xyz: 1}]\n", 5, "known: index, "
