@@ -41,6 +41,7 @@ notfound_context = {
 html_theme = "furo"
 html_title = f"tickrig {version}"
 html_show_sourcelink = False
+html_show_copyright = False  # the license is in the README
 html_static_path = ["site/site.css"]
 html_css_files = ["site.css"]
 
