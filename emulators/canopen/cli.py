@@ -106,9 +106,12 @@ def main(  # noqa: PLR0913 - options
     """Emulate CANopen slaves on a CAN bus, from EDS, DCF or XDD files or built-in models.
 
     The bus is a python-can bus, selected by -i and -c, its environment variables or its
-    configuration files. The emulator runs in real time until Ctrl-C. A scenario alone runs in
-    virtual time: as fast as possible, with the same candump log each time, and with exit status 1
-    if an expectation was missed. Together with -i, -c or --control it is played in real time.
+    configuration files.
+
+    The emulator runs in real time until Ctrl-C. With --scenario but without -i, -c and --control,
+    the scenario runs in virtual time: as fast as possible, with the same candump log each time, and
+    with exit status 1 if an expectation was missed. With one of these three options, the scenario
+    runs in real time.
 
     \b
     canopen-slave-emu --model epos --node-id 5 -i socketcan -c vcan0

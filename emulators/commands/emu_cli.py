@@ -34,9 +34,10 @@ _OURS: Final = {
 """Built-in devices, with their own command lines."""
 
 _HELP: Final = """\
-The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
-possible, with the same transcript each time, and with exit status 1 if an expectation was missed.
-Together with --link, --serve or --control it is played in real time."""
+The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve and
+--control, the scenario runs in virtual time: as fast as possible, with the same transcript each
+time, and with exit status 1 if an expectation was missed. With one of these three options, the
+scenario runs in real time."""
 
 
 class _DeviceGroup(LazyGroup):

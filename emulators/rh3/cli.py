@@ -10,9 +10,10 @@ from tickrig.emulators.rh3.fields import FIELDS
 def main() -> None:
     """Emulate the base of Reference Hardware 3, a Modbus RTU slave, on a pseudo-terminal.
 
-    The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
-    possible, with the same transcript each time, and with exit status 1 if an expectation was
-    missed. Together with --link, --serve or --control it is played in real time.
+    The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve and
+    --control, the scenario runs in virtual time: as fast as possible, with the same transcript each
+    time, and with exit status 1 if an expectation was missed. With one of these three options, the
+    scenario runs in real time.
 
     \b
     rh3-emu --link /tmp/rh3 --control /tmp/rh3.ctl

@@ -8,11 +8,12 @@ from tickrig.emulators.rrc.fields import FIELDS
 
 @serial_command("rrc", FIELDS, "tickrig.device.rrc.board:INPUTS", panel=True)
 def main() -> None:
-    """Emulate an RRC, with the VR2 wheelchair around it, on a pseudo-terminal.
+    """Emulate an RRC, the controller of the wheelchair VR2, with the VR2, on a pseudo-terminal.
 
-    The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
-    possible, with the same transcript each time, and with exit status 1 if an expectation was
-    missed. Together with --link, --serve or --control it is played in real time.
+    The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve,
+    --control and --panel, the scenario runs in virtual time: as fast as possible, with the same
+    transcript each time, and with exit status 1 if an expectation was missed. With one of these
+    four options, the scenario runs in real time.
 
     \b
     rrc-emu --link /tmp/rrc --control /tmp/rrc.ctl

@@ -15,9 +15,10 @@ from tickrig.emulators.rtc_lite.fields import FIELDS
 def main() -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
 
-    The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
-    possible, with the same transcript each time, and with exit status 1 if an expectation was
-    missed. Together with --link, --serve or --control it is played in real time.
+    The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve and
+    --control, the scenario runs in virtual time: as fast as possible, with the same transcript each
+    time, and with exit status 1 if an expectation was missed. With one of these three options, the
+    scenario runs in real time.
 
     Faults of the device: power_cut, slow_answer. Faults of the line: noise=0.01 (random bytes),
     flip=0.001 (inverted bits), ping=0.5 (every second PING is unanswered), radio=0.05 (a lossy

@@ -10,9 +10,10 @@ from tickrig.emulators.urg.fields import FIELDS
 def main() -> None:
     """Emulate a scanning range finder URG-04LX (SCIP 1.1 and 2.0) on a pseudo-terminal.
 
-    The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
-    possible, with the same transcript each time, and with exit status 1 if an expectation was
-    missed. Together with --link, --serve or --control it is played in real time.
+    The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve and
+    --control, the scenario runs in virtual time: as fast as possible, with the same transcript each
+    time, and with exit status 1 if an expectation was missed. With one of these three options, the
+    scenario runs in real time.
 
     \b
     urg-emu --link /tmp/urg --control /tmp/urg.ctl --room 4,3 --post 1,0.5,0.1

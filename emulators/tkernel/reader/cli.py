@@ -11,10 +11,12 @@ def main() -> None:
     """Emulate an infra-red reader of ucodes on a pseudo-terminal (38400 8N1).
 
     Markers in the environment send ucodes of 128 bits, written as 32 hex digits; the reader reports
-    the ucodes in range every 100 ms, in lines of ASCII. The emulator runs in real time until
-    Ctrl-C. A scenario alone runs in virtual time: as fast as possible, with the same transcript
-    each time, and with exit status 1 if an expectation was missed. Together with --link, --serve or
-    --control it is played in real time.
+    the ucodes in range every 100 ms, in lines of ASCII.
+
+    The emulator runs in real time until Ctrl-C. With --scenario but without --link, --serve and
+    --control, the scenario runs in virtual time: as fast as possible, with the same transcript each
+    time, and with exit status 1 if an expectation was missed. With one of these three options, the
+    scenario runs in real time.
 
     \b
     ucode-reader-emu --link /tmp/ucode --control /tmp/ucode.ctl \\
