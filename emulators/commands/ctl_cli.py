@@ -225,9 +225,10 @@ def press(name: str, duration: str) -> Object:
 @click.argument("spec", shell_complete=_complete(faults))
 @click.option("--for", "duration", help="How long, as 2s.  [until it is cleared]")
 def fault(spec: str, duration: str | None) -> Object:
-    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]. Times count from the start.
+    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]].
 
-    Times with +, as in cut@+1s-+2s, count from now.
+    FROM and TO are times since the start of the emulator. Times with +, as in cut@+1s-+2s, count
+    from now.
 
     \b
     tickrig ctl /tmp/rrc.ctl fault flip=0.001
@@ -253,7 +254,7 @@ def clear(name: str) -> Object:
 
 @verb(_faults)
 def faults_() -> Object:
-    """List the faults: on or off, start time, number of actions, arguments.
+    """List the faults: on or off, start time, how often each fault has acted, arguments.
 
     \b
     tickrig ctl /tmp/rrc.ctl faults
@@ -285,7 +286,9 @@ def status() -> Object:
 @verb(whom=_SERVER)
 @click.argument("node", type=click.IntRange(1, 127))
 def restart(node: int) -> Object:
-    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again.
+    """Reset a node of an rtc-canopen-server. The server sets up the node again after the reset.
+
+    NODE is the node-ID.
 
     \b
     tickrig ctl /tmp/robot.ctl restart 5
@@ -301,7 +304,7 @@ _NUMBERS: Final = {"ignore_unknown_options": True}
 @click.argument("y", type=float)
 @click.argument("deg", type=float)
 def goal(x: float, y: float, deg: float) -> Object:
-    """Drive the cart of 'rh3 serve' to X and Y in metres, and turn it to DEG degrees.
+    """Drive the cart of a running 'rh3 serve' to X and Y in metres, and turn it to DEG degrees.
 
     \b
     tickrig ctl /tmp/cart goal 1 0.5 90
@@ -312,7 +315,9 @@ def goal(x: float, y: float, deg: float) -> Object:
 @verb(whom=_CART)
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
-    """Drive the cart along the points of FILE, as 'rh3 path', or along its defined path.
+    """Drive the cart of a running 'rh3 serve' along the points of FILE.
+
+    FILE has the format of 'rh3 path'. Without FILE, the cart drives a square of 1 m.
 
     \b
     tickrig ctl /tmp/cart path corners.txt
@@ -328,7 +333,10 @@ def path(file: Path | None) -> Object:
 
 @verb(whom=_CART)
 def end() -> Object:
-    """Put PositionInput into Error after the last command has finished.
+    """Finish the commands of 'rh3 serve', then put its component PositionInput into Error.
+
+    Error is a state of an RT component. PositionInput accepts no more commands until you reset and
+    activate it.
 
     \b
     tickrig ctl /tmp/cart end
