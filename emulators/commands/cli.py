@@ -13,7 +13,7 @@ from tickrig.host.cli.options import LazyGroup, version_option, works_in
 DEMOS: Final = {
     "rrc": (
         "tickrig.emulators.demos.cli:rrc",
-        "Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.",
+        "Drive an emulated RRC, the controller of a wheelchair, on a pty.",
     ),
     "rtc-lite": (
         "tickrig.emulators.demos.cli:rtc_lite",
@@ -21,7 +21,7 @@ DEMOS: Final = {
     ),
     "tkernel": (
         "tickrig.emulators.demos.cli:tkernel",
-        "Let a robot keep its position by ucodes while the service that resolves them is gone.",
+        "Let a robot find its position by infra-red markers while a service is unreachable.",
     ),
     "fig120": (
         "tickrig.emulators.demos.cli:fig120",
@@ -30,19 +30,19 @@ DEMOS: Final = {
     ),
     "follow": (
         "tickrig.emulators.demos.cli:follow",
-        "Let two robots follow a preceding one (experiment A, Fig. 96).",
+        "Let two robots follow a preceding one (NEDO report, experiment A, Fig. 96).",
     ),
     "leader": (
         "tickrig.emulators.demos.cli:leader",
-        "Exchange leaders of two pairs of robots, remove a connection and join it again (B1).",
+        "Exchange the leaders of two pairs of robots, then remove a connection and join it again.",
     ),
     "four": (
         "tickrig.emulators.demos.cli:four",
-        "Drive four robots with one joystick, then each with any (B2, Figs. 91 and 101).",
+        "Drive four robots with one joystick, then two of them with another joystick.",
     ),
     "joystick": (
         "tickrig.emulators.demos.cli:joystick",
-        "Drive two robots of different make with one joystick (Fig. 92).",
+        "Drive two robots of different make with one joystick (NEDO report, Fig. 92).",
     ),
     "rh3": (
         "tickrig.emulators.demos.cli:rh3",
@@ -116,7 +116,7 @@ _COMMANDS: Final = {
     ),
     "compare": (
         f"{_TESTING}.compare_cli:compare_command",
-        "Replay the host of a recorded run against an emulator; report different answers.",
+        "Replay a recorded host against an emulator; report differences from the recording.",
     ),
     "ctl": (
         f"{_HERE}.ctl_cli:ctl",

@@ -28,7 +28,10 @@ _LIVE: Final[Decorator] = add_options(
 @click.command()
 @works_in("tickrig.emulators.demos.terminal_cli:show_rrc")
 def rrc() -> None:
-    """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.
+    """Drive an emulated RRC, the controller of a wheelchair, on a pty.
+
+    The demonstration shows power-on, the sample commands of the RRC's manual, output mode and a
+    watchdog trip.
 
     \b
     tickrig demo rrc
@@ -41,8 +44,9 @@ def rrc() -> None:
 def rtc_lite(virtual: bool) -> None:
     """Send numbers through two emulated PICs, cut the power of one, and see it come back.
 
-    ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
-    RTComponent-Lite. The devices are processes on two ptys, in real time.
+    The demonstration repeats the experiments of the paper on RTComponent-Lite. The component
+    ConsoleIn sends numbers through LiteA and LiteB, which run on the PICs, to ConsoleOut. The
+    devices are processes on two ptys, in real time.
 
     \b
     tickrig demo rtc-lite
@@ -54,12 +58,13 @@ def rtc_lite(virtual: bool) -> None:
 @click.option("--no-caches", is_flag=True, help="Entries of the caches do not outlive the outage.")
 @works_in("tickrig.emulators.demos.terminal_cli:show_tkernel")
 def tkernel(no_caches: bool) -> None:
-    """Let a robot keep its position by ucodes while the service that resolves them is gone.
+    """Let a robot find its position by infra-red markers while a service is unreachable.
 
-    A cart of Reference Hardware 3 with worn wheels drives along a corridor with infra-red markers;
-    a node on T-Kernel reads their ucodes. On the way back the resolution service is unreachable,
-    and the caches of the node replace it. The run is in virtual time and prints the same lines each
-    time.
+    A cart of Reference Hardware 3 with worn wheels drives along a corridor with infra-red markers.
+    Each marker sends a ucode, a number that identifies the marker. A node on T-Kernel reads the
+    ucodes. The resolution service gives the place of each ucode. On the way back the service is
+    unreachable, and the node takes the places from its caches. The run is in virtual time and
+    prints the same lines each time.
 
     \b
     tickrig demo tkernel
@@ -89,7 +94,7 @@ def fig120(plot: Path | None, **options: Any) -> None:
 @_LIVE
 @works_in("tickrig.emulators.demos.terminal_cli:show_follow")
 def follow(**options: Any) -> None:
-    """Let two robots follow a preceding one (experiment A, Fig. 96).
+    """Let two robots follow a preceding one (NEDO report, experiment A, Fig. 96).
 
     A joystick drives Ref-Hard, Segway RMP follows Ref-Hard by its position, and Omni-Wheel follows
     Segway RMP. The run is in virtual time and prints the same lines each time. With --control or
@@ -107,12 +112,13 @@ def follow(**options: Any) -> None:
 @_LIVE
 @works_in("tickrig.emulators.demos.terminal_cli:show_leader")
 def leader(**options: Any) -> None:
-    """Exchange leaders of two pairs of robots, remove a connection and join it again (B1).
+    """Exchange the leaders of two pairs of robots, then remove a connection and join it again.
 
-    Two joysticks drive Omni-Wheel and Segway RMP; Ref-Hard and BlackShip follow them. The leaders
-    are exchanged twice, then Ref-Hard's connection is removed, and joined again (Figs. 98 and 99).
-    The run is in virtual time and prints the same lines each time. With --control or --openrtm it
-    runs in real time, and other programs can change the connections.
+    This is experiment B1 of the NEDO report (Figs. 98 and 99). Two joysticks drive the robots
+    Omni-Wheel and Segway RMP. The robots Ref-Hard and BlackShip follow these two. The leaders are
+    exchanged twice. Then the connection of Ref-Hard is removed, and joined again. The run is in
+    virtual time and prints the same lines each time. With --control or --openrtm it runs in real
+    time, and other programs can change the connections.
 
     \b
     tickrig demo leader --plot leader.png
@@ -126,13 +132,14 @@ def leader(**options: Any) -> None:
 @_LIVE
 @works_in("tickrig.emulators.demos.terminal_cli:show_four")
 def four(**options: Any) -> None:
-    """Drive four robots with one joystick, then each with any (B2, Figs. 91 and 101).
+    """Drive four robots with one joystick, then two of them with another joystick.
 
-    The experiment begins with the connections at the end of B1. All connections that command a
-    robot are removed, and the robots stop. Then one joystick is connected to all four, and later
-    two of them are given to the other joystick. The run is in virtual time and prints the same
-    lines each time. With --control or --openrtm it runs in real time, and other programs can change
-    the connections.
+    This is experiment B2 of the NEDO report (Figs. 91 and 101). It begins with the connections at
+    the end of experiment B1, which 'tickrig demo leader' shows. All connections that command a
+    robot are removed, and the robots stop. Then one joystick is connected to all four robots. Later
+    the other joystick is connected to two of the robots instead. The run is in virtual time and
+    prints the same lines each time. With --control or --openrtm it runs in real time, and other
+    programs can change the connections.
 
     \b
     tickrig demo four --plot four.png
@@ -144,11 +151,13 @@ def four(**options: Any) -> None:
 @_LIVE
 @works_in("tickrig.emulators.demos.terminal_cli:show_joystick")
 def joystick(**options: Any) -> None:
-    """Drive two robots of different make with one joystick (Fig. 92).
+    """Drive two robots of different make with one joystick (NEDO report, Fig. 92).
 
-    The joystick writes RTC::TimedVelocity of phase 1 to Ref-Hard on two wheels and to Omni-Wheel.
-    The run is in virtual time and prints the same lines each time. With --control or --openrtm it
-    runs in real time, and other programs can change the connections.
+    The joystick writes velocities to the robot Ref-Hard, which has two wheels, and to the robot
+    Omni-Wheel, which has omni wheels. The ports have the type RTC::TimedVelocity, which belongs to
+    phase 1 of the common interfaces of the report. The run is in virtual time and prints the same
+    lines each time. With --control or --openrtm it runs in real time, and other programs can change
+    the connections.
 
     \b
     tickrig demo joystick --plot joystick.png
@@ -163,8 +172,8 @@ def joystick(**options: Any) -> None:
 def rh3(plot: Path | None) -> None:
     """Let a cart of Reference Hardware 3 drive to a goal, and along a path.
 
-    PositionInput sends a goal, then the square that it has as its path; the cart stands on rough
-    ground. The run is in virtual time and prints the same lines each time.
+    The component PositionInput sends a goal. Then PositionInput sends a square as the path. The
+    cart stands on rough ground. The run is in virtual time and prints the same lines each time.
 
     \b
     tickrig demo rh3
@@ -178,8 +187,9 @@ def rh3(plot: Path | None) -> None:
 def beego(plot: Path | None) -> None:
     """Drive beego, two CANopen drives at its wheels, with a joystick.
 
-    The server of RTC-CANopen starts two emulated EPOS as proxies; a joystick drives straight on,
-    along an arc and on the spot. The run is in virtual time and prints the same lines each time.
+    The two drives are emulated EPOS. The server of RTC-CANopen starts a proxy, an RT component, for
+    each drive. A joystick drives straight on, along an arc and on the spot. The run is in virtual
+    time and prints the same lines each time.
 
     \b
     tickrig demo beego
@@ -193,9 +203,9 @@ def beego(plot: Path | None) -> None:
 def fourx(plot: Path | None) -> None:
     """Drive FourX, four motor core units at its wheels, with a joystick.
 
-    The server of RTC-CANopen starts four emulated motor core units as proxies; a joystick drives
-    straight on, along an arc and on the spot. The run is in virtual time and prints the same lines
-    each time.
+    The motor core units are emulated. The server of RTC-CANopen starts a proxy, an RT component,
+    for each unit. A joystick drives straight on, along an arc and on the spot. The run is in
+    virtual time and prints the same lines each time.
 
     \b
     tickrig demo fourx

@@ -26,7 +26,7 @@ _tolerance: Final = add_options(
         "numbers",
         multiple=True,
         metavar="PATTERN=MOST",
-        help="Tolerance of numbers in lines: 'EV:batt*=5', '181#*[2:4]=1%'.",
+        help="Largest difference of numbers in lines: 'EV:batt*=5', '181#*[2:4]=1%'.",
     ),
     click.option("--ignore", multiple=True, metavar="PATTERN", help="Lines to ignore."),
     click.option(
@@ -43,7 +43,7 @@ _tolerance: Final = add_options(
 @click.option("-v", "--verbose", is_flag=True, help="List all lines, also equal ones.")
 @works_in("tickrig.emulators.testing.commands.compare:run_compare")
 def compare_command(**options: Any) -> None:
-    """Replay the host of a recorded run against an emulator; report different answers.
+    """Replay a recorded host against an emulator; report differences from the recording.
 
     FILE is a trace of 'tickrig record', of an emulator or of a bench. The exit status is 0 if the
     emulator gives the same answers, 1 if not, and 2 if the runs cannot be compared.

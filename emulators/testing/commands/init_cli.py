@@ -34,7 +34,7 @@ def init(types: tuple[str, ...], file: Path) -> None:
     """Write an initial rig file: devices with all their options.
 
     The file is valid and runs unchanged. Comments in the file propose inputs, faults and ports. An
-    existing file is not changed. FILE - is standard output.
+    existing file is not changed. With - as FILE, the command writes to standard output.
 
     \b
     tickrig init

@@ -20,10 +20,12 @@ from tickrig.host.cli.options import PATH, works_in
 def record_command(**options: Any) -> None:
     """Record the traffic between a host and the device at PORT, for `tickrig compare`.
 
-    The host opens the terminal that is printed, or --link, instead of PORT. PORT is a device path
-    or a URL of pyserial. Bytes pass unchanged and at once. Type manual actions on the device here
-    to record them: NAME=VALUE for an input, such as power_button=1, or reset if you switch the
-    device off and on. Ctrl-C ends the recording.
+    PORT is a device path or a URL of pyserial. The command makes a terminal, and prints the path of
+    the terminal. The host opens this terminal instead of PORT. The option --link makes a symbolic
+    link to the terminal. Bytes pass unchanged and at once. Ctrl-C ends the recording.
+
+    Type manual actions on the device here to record them: NAME=VALUE for an input, such as
+    power_button=1, or reset if you switch the device off and on.
 
     The exit status is 3 if the port is lost, or the recording is incomplete.
 

@@ -15,15 +15,16 @@ from tickrig.host.cli.options import PATH, run_code_option, works_in
 @click.option(
     "--host",
     metavar="FILE.py:Class",
-    help="FILE is a scenario that a search has found: do it with this BenchMachine.",
+    help="FILE is a scenario that check_host has printed: run it with this BenchMachine.",
 )
 @run_code_option
 @works_in("tickrig.emulators.testing.commands.replay:run_replay")
 def replay_command(**options: Any) -> None:
     """Replay the trace FILE on fresh devices; the exit status is 1 if an output differs.
 
-    With --host, FILE is a scenario of check_host, which runs again with a fresh bench and host. The
-    exit status is 1 if the run still fails.
+    With --host, FILE is a scenario that check_host, the search for errors of a host, has printed.
+    The scenario runs again with a fresh bench and host. The exit status is 1 if the run still
+    fails.
 
     \b
     rrc-emu --link /tmp/rrc --trace run.trace
