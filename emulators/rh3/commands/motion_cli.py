@@ -33,7 +33,7 @@ _SHARED: Final[Decorator] = add_options(
         type=Choice(["default", "tuned"]),
         default="default",
         show_default=True,
-        help="Configuration set: the specification's, or the more precise one.",
+        help="Configuration set: default (values of the specification) or tuned (more precise).",
     ),
     click.option("--device", metavar="URL", help="Serial port of a base; default: emulate one."),
     click.option(
@@ -69,10 +69,10 @@ _PLOT: Final[Decorator] = click.option(
 @click.group(cls=LazyGroup, commands={})
 @version_option()
 def main() -> None:
-    """Drive a cart of Reference Hardware 3: six components over a base.
+    """Drive a cart of Reference Hardware 3 with the six components of its motion chain.
 
-    The base is emulated in virtual time. With --device the base is real hardware or rh3-emu, in
-    real time. Ctrl-C stops the cart.
+    The base of the cart is emulated in virtual time. With --device the base is real hardware or
+    rh3-emu, in real time. Ctrl-C stops the cart.
 
     \b
     rh3 goto 1 0.5 1.57 --set tuned --plot track.svg
@@ -153,10 +153,18 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
 @_SHARED
 @works_in(f"{_WORK}:serve")
 def serve(**options: Any) -> None:
-    """Run the six components in real time until Ctrl-C, for you and other programs.
+    """Run the six components of the cart in real time until Ctrl-C, for you and other programs.
 
-    PositionInput reads the commands that you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path
-    alone for a square of 1 m, end. The units are metres and degrees, but radians in FILE.
+    Type commands for the component PositionInput, one per line:
+
+    \b
+    goal X Y DEG         drive to X and Y, and turn to DEG
+    path FILE            drive along the points of FILE
+    path X Y, X Y DEG    drive along these points, two or more
+    path                 drive a square of 1 m
+    end                  put PositionInput into the state Error after the last command
+
+    The units are metres and degrees, but radians in FILE.
 
     \b
     printf 'goal 1 0 90\\npath 0 0, 1 1\\n' | rh3 serve
