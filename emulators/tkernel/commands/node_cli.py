@@ -38,10 +38,10 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 def main(**options: Any) -> None:
     """Emulate a board with OpenRTM on T-Kernel, until Ctrl-C.
 
-    The RT components of the board are those of Figs. 122 and 123 of the NEDO report, or those of a
-    SYSTEM file. The board has the limits of a small board: requests beyond them are refused with a
-    message. The board does not answer until it has booted. A power cut loses everything except
-    files.
+    The board runs the RT components of the NEDO report (Figs. 122 and 123), or those of a SYSTEM
+    file. The board has limits, such as --connectors and --message-octets. It refuses requests
+    beyond these limits with a message. The board does not answer until it has booted. A power cut
+    loses everything except files.
 
     \b
     urg-emu --link /tmp/urg --room 4,3

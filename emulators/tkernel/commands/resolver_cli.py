@@ -31,9 +31,9 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 def main(**options: Any) -> None:
     """Serve a TABLE of ucodes over HTTP on loopback, until Ctrl-C.
 
-    GET /ucodes/UCODE answers with the address of the information of a ucode. GET /contents/NAME
-    answers with the information. The status is 404 if there is none. The faults of the service have
-    names.
+    A ucode is a number that identifies a place or a thing. GET /ucodes/UCODE answers with the
+    address of the information about a ucode. GET /contents/NAME answers with the information. The
+    HTTP status is 404 if there is no such address or information.
 
     \b
     ucode-resolver --example > places.toml
