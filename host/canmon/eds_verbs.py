@@ -56,8 +56,9 @@ def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | 
     """Check EDS files and print all findings. The exit status is 1 if there is an error.
 
     A finding is a line with file, line, severity, rule, the value and the allowed values, the fix,
-    and the clause of the standard. Notes never count. Warnings count with --strict. The exit status
-    is 2 if a file cannot be read, or if the report cannot be written.
+    and the clause of the standard. The severity is error, warning or note. With --strict, the exit
+    status is also 1 if there is a warning. Notes do not change the exit status. The exit status is
+    2 if a file cannot be read, or if the report cannot be written.
 
     \b
     canmon eds check drive.eds
@@ -164,9 +165,11 @@ def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_enc
     """Fix an EDS. The exit status is 1 if errors or warnings are left.
 
     Lines without a finding are unchanged to the byte, unless the file is not Unicode. Such a file
-    becomes UTF-8, and the assumed encoding is printed. The output lists the fixes with the lines of
-    FILE. It also lists the remaining findings, which need knowledge of the device, with the lines
-    of OUT. XDD files cannot be fixed.
+    becomes UTF-8, and the assumed encoding is printed. XDD files cannot be fixed.
+
+    The command prints each fix with its line number in FILE. The command also prints the findings
+    that are left, because their fix needs knowledge of the device. These findings have their line
+    number in OUT, the file of -o, or in FILE with --dry-run.
 
     \b
     canmon eds fix drive.eds -o fixed.eds
@@ -245,7 +248,8 @@ _COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "
 def show(file: Path, place: str | None, node: int, as_json: bool) -> None:
     """Show the device of an EDS: head, objects, PDOs at power-on.
 
-    Index and sub-index are hexadecimal. `T` and `R` mark the PDOs that may carry an entry.
+    Index and sub-index are hexadecimal. In the column access, T means that a TPDO may carry the
+    entry, and R means that an RPDO may carry the entry.
 
     \b
     canmon eds show drive.eds
@@ -318,9 +322,10 @@ _DIFFERENT: Final = 1
 def compare(old: Path, new: Path, as_json: bool) -> None:
     """Compare the devices of two EDS files. The exit status is 1 if they differ.
 
-    The command compares objects, entries and their fields, identity and bit rates, but not the
-    text. - marks items only in the first file, + marks items only in the second file, ~ marks
-    differences.
+    The command compares objects, entries and their fields, identity and bit rates. The command
+    ignores what does not concern the device: dates, file names, comments, the order of sections and
+    the notation of numbers. In the output, - marks items only in the first file, + marks items only
+    in the second file, and ~ marks differences.
 
     \b
     canmon eds diff old.eds new.eds
