@@ -125,10 +125,11 @@ def write(  # noqa: PLR0913, PLR0917 - options
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Write objects of NODE, by name or index, in this order.
+    """Write objects of NODE, by name or index, in the given order.
 
-    Values are decimal, hex (0x1F), in the unit of the object if its EDS has one, texts, or bytes in
-    hex. If the type is unknown, write it before the value: u16:5. The command stops at the first
+    The type of the object decides what VALUE is: a number in decimal or hex (0x1F), a text, or
+    bytes in hex. A number is in the unit of the object, if the EDS gives a unit. If the type of the
+    object is unknown, write a type before the value, as u16:5. The command stops at the first
     refused object. Earlier objects stay written.
 
     \b
@@ -196,7 +197,8 @@ def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) 
 
     A DCF is compared by its ParameterValues. A file without ParameterValues, such as an EDS, is
     compared by the defaults of all parameters. For two nodes, all parameters of the EDS are
-    compared. Values relative to the node-ID are compared without it. Nothing is written.
+    compared. If the EDS defines a value as an offset to the node-ID, only the offset is compared.
+    Nothing is written.
 
     \b
     canmon net can0 compare 5 drive.dcf
@@ -440,11 +442,12 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Write the configuration of the DCF or XDC FILE to NODE, where it differs.
+    """Write the configuration of the DCF or XDC FILE to NODE.
 
-    The configuration is the ParameterValues of FILE. PDOs are disabled while they change (CiA 301),
-    and 1020h is written last. The command stops at the first refused object, and reports the
-    written objects. A file of another device (1000h, 1018h) is refused.
+    The configuration is the ParameterValues of FILE. The command writes only the values that differ
+    from the present values of NODE. With --all, the command writes all values. PDOs are disabled
+    while they change (CiA 301), and 1020h is written last. The command stops at the first refused
+    object, and reports the written objects. A file of another device (1000h, 1018h) is refused.
 
     \b
     canmon net can0 dcf 5 drive.dcf --dry-run

@@ -96,7 +96,9 @@ _HALF: Final = (
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH, required=False)
 @click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
-@click.option("--control", type=Choice(list(COMMANDS)), help="Only command its program.")
+@click.option(
+    "--control", type=Choice(list(COMMANDS)), help="Send only this command to the program."
+)
 @click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; skip if the node has it.")
 @click.option("--no-start", is_flag=True, help="Leave the program stopped.")
 @click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")
@@ -115,11 +117,11 @@ def command(  # noqa: PLR0913, PLR0917 - options
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Download FILE to NODE by block transfer (CiA 302-3). Without FILE, show its program.
+    """Download FILE to NODE by block transfer (CiA 302-3). Without FILE, show the program of NODE.
 
     The steps are: stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), compare the
-    identification (1F56h), start. Finished steps are skipped, so the same command continues where
-    it ended. An interrupted transfer starts again, as CiA 301 requires. Lost blocks are sent again.
+    identification (1F56h), start. After an interruption, repeat the same command. The transfer then
+    starts again from the beginning, as CiA 301 requires. Lost blocks are sent again.
 
     \b
     canmon net can0 program 5
