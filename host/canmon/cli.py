@@ -12,7 +12,7 @@ from tickrig.host.cli.options import LazyGroup, version_option
 _HERE: Final = "tickrig.host.canmon.verbs"
 _VERBS: Final = {
     "dump": (f"{_HERE}.dump:dump", "Show frames as they come, and what they mean."),
-    "conv": (f"{_HERE}.dump:conv", "Write what SOURCE holds into the file LOG."),
+    "conv": (f"{_HERE}.dump:conv", "Write the content of SOURCE into the file LOG."),
     "info": (f"{_HERE}.info:command", "Show what log files hold."),
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
@@ -81,8 +81,8 @@ def eds() -> None:
     """Check, fix, compare and show EDS files: EDS, DCF, XDD, XDC.
 
     \b
-    canmon eds check drive.eds                    all findings, with line, clause and fix
-    canmon eds fix drive.eds -o fixed.eds         what needs no knowledge of the device
-    canmon eds diff old.eds new.xdd               the differences
-    canmon eds show drive.eds 6040                an object; without it, all of them
+    canmon eds check drive.eds                    print findings, with line, clause and fix
+    canmon eds fix drive.eds -o fixed.eds         fix errors that need no knowledge of the device
+    canmon eds diff old.eds new.xdd               print the differences of the devices
+    canmon eds show drive.eds 6040                print object 6040h; without 6040, all objects
     """  # noqa: D301 - click wants the backspace

@@ -345,10 +345,11 @@ def conv(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     strict: bool,
 ) -> None:
-    """Write what SOURCE holds into the file LOG. Its name says the format.
+    """Write the content of SOURCE into the file LOG.
 
-    Several files are merged by time. Items that a format cannot hold are reported on standard
-    error. From files, LOG is written completely or not at all.
+    The suffix of LOG selects the format. Several files are merged by time. Items that the format
+    cannot hold are reported on standard error. If each SOURCE is a file, LOG is written completely
+    or not at all.
 
     \b
     canmon conv a.blf b.log

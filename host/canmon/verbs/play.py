@@ -199,9 +199,10 @@ def _log_path(word: str) -> Path:
 def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     """Send the frames of LOG again, with the gaps that were recorded.
 
-    BUS takes all recorded frames. BUS=RECORDED takes the frames that were recorded on one bus, and
-    the frames of other buses are left out. Without a BUS, the bus of -c takes all frames. Error
-    frames are not sent. At the end, the command reports how late the frames were sent.
+    With BUS=RECORDED, the frames that were recorded on the bus RECORDED are sent on BUS. With BUS
+    alone, the frames of all other recorded buses are sent on BUS. Frames of recorded buses without
+    a BUS are not sent. Instead of these arguments, -c names one bus for all frames. Error frames
+    are not sent. At the end, the command reports how late the frames were sent.
 
     \b
     canmon play run.log vcan0

@@ -79,8 +79,10 @@ _FAILED: Final = 1
 def command(context: click.Context, /, words: Sequence[str], **options: Any) -> None:
     """Run the sequence FILE on BUS. The exit status is 1 if an expectation was missed.
 
-    Without a BUS, -c names the bus. A TOML file has steps that send, wait, expect and repeat. Any
-    other file has lines such as '+10 123#DEADBEEF', which sends a frame 10 ms after the line above.
+    Without a BUS, -c names the bus. A TOML file has steps that send, wait, expect and repeat. An
+    expect step contains a frame, a filter, or a list of frames and filters. A step with a list
+    waits for all frames of the list, in any order. Any other file has lines such as '+10
+    123#DEADBEEF', which sends a frame 10 ms after the line above.
 
     \b
     [vars]
@@ -88,7 +90,7 @@ def command(context: click.Context, /, words: Sequence[str], **options: Any) -> 
     [[step]]
     send = "000#01{id}"
     [[step]]
-    expect = "{0x700+id:3}#05"       # or "node=5 and heartbeat"; [...] for several
+    expect = "{0x700+id:3}#05"       # or a filter: "node=5 and heartbeat"
     within = "300ms"
     on-fail = "go-on"                # or "stop", or steps
 

@@ -223,10 +223,11 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Count a log: rates, gaps, jitter, missed cycles, exact load, error frames.
 
-    Gaps are those of all frames. p99 is at most 1/64 too long. A cycle is shown if most gaps are
-    near the median. "missed" counts the missing frames of the cycle. Jitter is the average
-    difference between successive gaps. Loads count stuff bits and are a share of the bit rate that
-    -b gives.
+    Gaps are the times between successive frames with the same CAN-ID. The statistics use all gaps
+    of the log. The shown 99th percentile of the gaps (p99) is at most 1/64 (1.6 %) longer than the
+    true percentile. A cycle is shown if most gaps are near the median. "missed" counts the missing
+    frames of the cycle. Jitter is the average difference between successive gaps. The load includes
+    stuff bits. The load is shown as a share of the bit rate that -b gives.
 
     \b
     canmon stats run.log -b 500000
