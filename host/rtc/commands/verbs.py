@@ -219,7 +219,8 @@ _names_needed = click.argument("names", nargs=-1, required=True, shell_complete=
 def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: bool) -> None:
     """List the components NAMES, or all components if none is named.
 
-    With -l, a line contains state, number of ports/connected ports, rate, type and name.
+    With -l, a line contains state, two numbers, rate, type and name. The numbers, such as 3/1, are
+    the number of ports and the number of connected ports.
 
     \b
     tickrig rtc ls -l
@@ -322,8 +323,9 @@ def _exit(at: Path, names: tuple[str, ...]) -> None:
 def inject(at: Path, port: str, value: str) -> None:
     """Write VALUE to the InPort PORT, as an OutPort connected with it would.
 
-    VALUE is JSON, and nothing else. It is the data of a value with a time, or a whole struct.
-    Octets are lists of numbers, and enumerators are names.
+    VALUE is JSON: an object with the fields of the port's data type. Missing fields have their
+    default. A missing time stamp tm is the present time. If the type has a field data, VALUE may
+    also be the value of this field alone. Octets are lists of numbers, and enumerators are names.
 
     \b
     tickrig rtc inject ConsoleOut0.in -5
@@ -474,12 +476,12 @@ def stop(at: Path) -> None:
 @click.argument("file", type=PATH)
 @at
 def check(at: Path, file: Path) -> None:
-    """Compare the system with FILE, .toml or .xml.
+    """Compare the system with the system file FILE.
 
-    Print a line for each part that the system lacks.
-
-    The exit status is 1 if the system lacks a part. States are compared with a .toml file, because
-    RTSProfile has none. Additional parts of the system do not matter.
+    FILE is TOML (.toml) or an RTSProfile (.xml). The command prints a line for each part of FILE
+    that is missing or different in the system. The exit status is then 1. Additional parts of the
+    system do not matter. With an RTSProfile, the states of the components are not compared, because
+    an RTSProfile cannot hold states.
 
     \b
     tickrig rtc check system.toml

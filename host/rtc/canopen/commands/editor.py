@@ -27,9 +27,11 @@ def main(
 ) -> None:
     """Serve a System Definition, and show and change it while it runs (extra tickrig[tui]).
 
-    The editor is the same server as rtc-canopen-server, on a terminal. It shows nodes and proxies,
-    their objects with live read and write, connections through the PC, and PDO links. Changes are
-    saved only on demand. F1 shows the keys.
+    FILE is the System Definition: YAML or JSON that describes the CANopen nodes of a system and
+    their connections. The editor contains the server of rtc-canopen-server, and shows the running
+    system on the terminal. The terminal shows nodes and proxies, their objects with live read and
+    write, connections through the PC, and PDO links. Changes are saved only on demand. F1 shows the
+    keys.
 
     \b
     rtc-canopen-editor robot.yaml
