@@ -75,20 +75,62 @@ class EmcyCode(DescribedCode):
 
 
 _TEXTS: Final = {int(code): code.text for code in EmcyCode}
+_OF_DRIVES: Final = {
+    0x5100: "hardware, supply",
+    0x5200: "hardware, control",
+    0x5300: "hardware, operating unit",
+    0x5400: "hardware, power section",
+    0x5500: "hardware, data storage",
+    0x7100: "power modules",
+    0x7110: "brake chopper",
+    0x7120: "motor",
+    0x7121: "motor blocked",
+    0x7122: "motor error or wrong commutation",
+    0x7123: "motor tilted",
+    0x7200: "measurement circuit",
+    0x7300: "sensor",
+    0x7301: "tacho fault",
+    0x7302: "wrong polarity of the tacho",
+    0x7303: "resolver 1 fault",
+    0x7304: "resolver 2 fault",
+    0x7305: "incremental sensor 1 fault",
+    0x7306: "incremental sensor 2 fault",
+    0x7307: "incremental sensor 3 fault",
+    0x7310: "speed sensor",
+    0x7320: "position sensor",
+    0x7400: "computation circuit",
+    0x7500: "communication module",
+    0x7600: "data storage module",
+    0x8300: "torque control",
+    0x8311: "excess torque",
+    0x8400: "velocity controller",
+    0x8500: "position controller",
+    0x8600: "positioning controller",
+    0x8611: "following error",
+    0x8612: "reference limit",
+    0x8700: "sync controller",
+}
+"""Texts of codes that CiA 402 adds for drives, where CiA 301 has only a class such as 7000h."""
 
 
 def describe(code: int) -> str:
     """Return the text of an emergency error code, or of its class.
 
+    If CiA 301 has only a class for a code, and CiA 402 has a text, the text names CiA 402.
+
     >>> describe(0xFF01), describe(0x4711), describe(0x0001)
     ('CANopen device specific, generic error', 'temperature, generic error', 'unknown')
+    >>> describe(0x7320), describe(0x8611)
+    ('position sensor (CiA 402)', 'following error (CiA 402)')
     """
     # From the code itself to its class: 8131h reads as 8130h, 8190h as 8100h. 0000h is no
     # class.
     for mask in (0xFFFF, 0xFFF0, 0xFF00, 0xF000):
-        text = _TEXTS.get(code & mask)
-        if text is not None and (code & mask or not code):
-            return text
+        kind = code & mask
+        if kind in _OF_DRIVES:
+            return f"{_OF_DRIVES[kind]} (CiA 402)"
+        if kind in _TEXTS and (kind or not code):
+            return _TEXTS[kind]
     return "unknown"
 
 
