@@ -58,7 +58,7 @@ def arc(
     `Pose` is made.
     """
     x_m, y_m, heading_rad = place
-    turn_rad = (right_m - left_m) / tread_m
+    turn_rad = (right_m - left_m) / tread_m  # the chord has the heading in the middle of the arc
     half_rad = turn_rad / 2
     chord_m = (left_m + right_m) / 2
     if half_rad:
@@ -106,8 +106,9 @@ class Contact:
     def roll(self, turn_rad: float, step_s: float) -> float:
         """Turn the wheel by an angle; return the distance that it rolls over the ground, in metres.
 
-        The wheel turns at a steady speed during the step. Friction limits the acceleration of the
-        wheel over the ground. If the rim of the wheel accelerates more, the wheel slips.
+        The wheel turns at a steady speed during the step. Friction limits how fast the speed of the
+        wheel over the ground can change. While this speed differs from the speed of the wheel's
+        rim, the wheel slips.
         """
         rim_m_s = turn_rad * self.radius_m / step_s
         speed_m_s = rim_m_s

@@ -296,7 +296,8 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
 
     Once the component is initialized, the NMT state of the node determines the state of the
     component. When the NMT state changes, the services of the node are notified first. Then the
-    callbacks for the new state run.
+    callbacks for the new state run. It does not matter what changes the NMT state: the NMT master,
+    the error behaviour or the component itself.
 
     Args:
         node: CANopen slave on which the component runs.
@@ -370,7 +371,8 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     def run(self) -> None:
         """Run the periodic callback of the present state, such as `on_execute`.
 
-        If the callback returns an error, the component changes to the state Error.
+        If the callback returns an error, the component changes to the state Error (transitions M5
+        and M6 of the life cycle).
         """
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)

@@ -92,7 +92,9 @@ class ReceiveBuffer:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
         thrown_blocks: number of whole blocks of `size` bytes that were discarded after overflows.
-            Each block costs as much processing time as an overflow.
+            Each block costs as much processing time as an overflow. After an
+            overflow, the discarded bytes are counted up to the end of the line. A rest of less than
+            `size` bytes is not counted.
     """
 
     size: int

@@ -21,6 +21,9 @@ class Immutable:
         shared_by_twins: flag that is always true. The code that copies a machine reads it.
     """
 
+    # A class in `tickrig.wire` has the flag itself instead of this base class, because that package
+    # does not import `tickrig.device`.
+
     __slots__ = ()
     shared_by_twins: ClassVar[bool] = True
 

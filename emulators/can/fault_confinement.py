@@ -103,7 +103,8 @@ class FaultConfinement(Part):
         changed: function that is called with the time and the end whenever an error state changes.
 
     Attributes:
-        marked: ends with a counter that is not 0.
+        marked: ends with a counter that is not 0. While there are none, the bus need not count
+            frames without errors.
     """
 
     def __init__(self, ends: list[CanEnd], changed: Callable[[int, CanEnd], None]) -> None:

@@ -354,8 +354,8 @@ class EdsCache:
 
     Attributes:
         others: cached results of functions that read several files, such as `read_bus`. A key
-            contains arguments of such a function, such as the path of the bus.yml. Each result is
-            stored with the versions of the files from which it was made.
+            contains the arguments that determine the result, such as the path of the bus.yml. Each
+            result is stored with the versions of the files from which it was made.
     """
 
     def __init__(self) -> None:

@@ -127,6 +127,8 @@ EITHER_WAY: Final = replace(WAY, default="both", bare=False)
 class FaultForm(Immutable):
     """Description of a fault and its arguments.
 
+    The entries of fault tables are objects of subclasses.
+
     Attributes:
         text: description of the fault as readable text.
         rated: whether the fault also accepts the arguments `rate=` (a probability) and `count=` (a

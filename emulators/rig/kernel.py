@@ -106,8 +106,8 @@ if TYPE_CHECKING or _KERNEL is None:
 
         Args:
             rig: the rig.
-            parts: the parts of the rig that the kernel uses, such as the event queue and the
-                devices at their ports.
+            parts: the parts of the rig that the kernel uses: timetable, bus, event queue,
+                `Horizon`, watchers, hosts, and the devices at their ports (stations).
             until_us: end of the run, in microseconds.
             unseen_us: time in microseconds. Before this time probably no code reads a device, so a
                 device may compute several ticks in advance.

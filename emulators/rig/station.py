@@ -19,6 +19,9 @@ from tickrig.wire.uart import UartSetting
 class WirePort(Protocol[W]):
     """Protocol of a `Port` that reports the arrival of traffic, so the rig need not poll it."""
 
+    # Not derived from `Port`: a compiled base class has additional names, which would become
+    # members of the protocol.
+
     @property
     def wire(self) -> Wire:
         """The wire of the port."""

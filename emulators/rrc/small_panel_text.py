@@ -44,7 +44,10 @@ def controls_pane(view: PanelView) -> Text:
 
 
 def report_line(view: PanelView) -> Text:
-    """Return the latest status `SA` of the RRC as a line of the panel."""
+    """Return the latest status `SA` of the RRC as a line of the panel.
+
+    The line contains the counters of the speed and alarm buttons.
+    """
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(

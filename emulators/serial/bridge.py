@@ -102,7 +102,7 @@ class Bridge:
 
         The exact time at which a host has written data is not known: it is after the last poll and
         before this poll. The data are sent as if the host had written them right after the last
-        poll, so that the poll does not delay them.
+        poll, so that the poll does not delay them by up to a tick.
         """
         if self._pending:
             self._attend(now_us)
@@ -161,7 +161,8 @@ class HostEnd:
     def arrival_us(self, count: int) -> int:
         """Return the time at which to check whether `count` bytes have arrived at this end.
 
-        If bytes are missing at this time, the caller calls this method again.
+        The result may be `NEVER`. If bytes are missing at this time, the caller calls this method
+        again.
         """
         return self._end.arrival_us(count)
 
@@ -218,8 +219,9 @@ class HostEnd:
 class Tap(Copyable, Generic[W]):
     """Wrapper of a port that reports all its traffic to listeners.
 
-    The wrapped port is a port of the device: `poll` returns the data that go to the device, and
-    `send` forwards the data that come from the device. A copy of the wrapper has no listeners.
+    The wrapped port is the device's end of a wire, or the port of the host. `poll` returns the data
+    that go to the device, and `send` forwards the data that come from the device. A copy of the
+    wrapper has no listeners.
 
     Args:
         port: the wrapped port.

@@ -211,8 +211,9 @@ class Unanswered(list[Object]):
         no more late answers about `at`.
 
         The result is an object of `FENCES`, but not `at`. If the latest request was for such an
-        object, that object is returned again. Otherwise, an object without an unanswered request is
-        returned. If there is none, the oldest requests are forgotten until there is one.
+        object, that object is returned again, so that a node that is gone gets repeated requests
+        for the same object. Otherwise, an object without an unanswered request is returned. If
+        there is none, the oldest requests are forgotten until there is one.
         """
         last = self[-1]
         if last in FENCES and last != at:

@@ -22,7 +22,8 @@ class RealClock:
     def wait_until(self, t_us: int, /) -> int:
         """Sleep until a time.
 
-        If the time has passed already, the method returns at once.
+        If the time has passed already, the method returns at once. Thus a late rig catches up
+        without skipping ticks.
 
         Args:
             t_us: time in microseconds since the first wait.

@@ -85,8 +85,8 @@ def command_of(controlword: int) -> Command | None:
 class Automaton(Part):
     """The state machine of a drive (CiA 402), which follows the controlword and faults.
 
-    The transitions 5 and 8 lead out of the state "Operation enabled". If the option codes require
-    it, the motor is braked before these transitions.
+    The transitions 5 and 8 lead from the state "Operation enabled" to "Switched on" and to "Ready
+    to switch on". If the option codes require it, the motor is braked before these transitions.
 
     Args:
         stopping: object that brakes according to the option codes.

@@ -173,6 +173,9 @@ class Journal(WireLog):
 
         On some serial lines a frame ends by a silence. The last frame on such a serial line is
         included, although it may not be complete yet.
+
+        The order of time can differ from the order in which entries were added. For example, an
+        action is added at once, but has the time of the next tick of its device.
         """
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         lines = (*self.since(0), *(replace(line, number=number) for number, line in begun))

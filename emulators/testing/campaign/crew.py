@@ -281,7 +281,7 @@ class LocalWorkers:
 
     def __init__(self, crew: Crew, digest: str, count: int) -> None:
         self._crew, self._digest, self.count = crew, digest, count
-        self._threads = ThreadPoolExecutor(count)
+        self._threads = ThreadPoolExecutor(count)  # a thread waits for each process
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
         """Submit runs to a process."""

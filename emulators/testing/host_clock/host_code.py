@@ -35,7 +35,10 @@ class UnpatchedTimeError(HostTimeError):
 
 
 class HostHangsError(AssertionError):
-    """Raised if a host does not return, because it waits longer than the bench allows."""
+    """Raised if a host does not return, because it waits longer than the bench allows.
+
+    In a search for failures, the class `BenchMachine` sets this limit.
+    """
 
     __module__ = "tickrig"
 

@@ -67,7 +67,7 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
 
     Args:
         runs: object that executes the steps.
-        max_examples: number of runs, if no failure is found.
+        max_examples: largest number of runs, if no failure is found.
         max_steps: largest number of steps in a run.
         seed: seed of the random choices, or None for a different search each time.
 

@@ -249,7 +249,7 @@ class HostFailure:
     Attributes:
         error: exception that was raised.
         violated: part of the machine that failed: an invariant such as `invariant it_is_slow`, a
-            rule such as `rule drive`, or the method `connect` or `end`.
+            rule such as `rule drive`, the method `connect` or `end`, or another step.
         at_us: time of the failure on the bench, in microseconds.
         steps: steps of the run before the failure.
         passed: last traffic that passed over the wires before the failure, as text.

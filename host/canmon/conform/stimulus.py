@@ -469,7 +469,7 @@ class Consent:
         - With the option `--yes`, the answer is yes.
         - If the node is emulated in virtual time, the answer is also yes, with one exception: if
           other nodes are on the bus, the answer to the question about LSS commands to all nodes is
-          no.
+          no, because the other nodes would also answer.
         - In any other case, if there is no terminal, the answer is no.
         """
         if self._yes:

@@ -242,6 +242,7 @@ class BitMemory:
 
     def __init__(self, payload: int) -> None:
         self._payload, self._latest, self.notched = payload, 0, 0
+        # All counters are updated at once: each integer holds one binary digit of all counters.
         self._planes: list[int] = []
 
     def take(self, payload: int) -> None:

@@ -272,13 +272,13 @@ class OpenBus:
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     """Combine the SOURCE word of a bus with the options of the command.
 
-    If the word and an option both give the interface or a bit rate, the word has priority.
+    If the word and an option both give a bit rate, the word has priority. The words `udp` and `sim`
+    give the interface, even if the option `-i` gives another one.
 
-    If the option `-i` gives the interface, the word gives only the channel:
+    If the option `-i` gives the interface, any other word gives only the channel and bit rates:
 
-    - If the word begins with the name of this interface and a colon, the channel is the rest of the
-      word.
-    - Otherwise, the channel is the whole word, even if it contains colons.
+    - If the word begins with the name of this interface and a colon, the channel is the rest.
+    - Otherwise, the channel is the whole word before its bit rates, even if it contains colons.
 
     Raises:
         Refused: the word and -c name different channels.

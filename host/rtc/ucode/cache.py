@@ -132,7 +132,7 @@ class LookupCache(Generic[_V]):
             address counts as unknown.
 
     Attributes:
-        counts: numbers of hits, misses and failed requests.
+        counts: numbers of results, such as hits, misses and failed requests.
         trouble: reason why the latest request failed, empty if it succeeded.
         invalid: latest text that `parse` rejected, with the reason.
     """

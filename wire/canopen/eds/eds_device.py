@@ -341,9 +341,9 @@ def read_device(file: EdsFile) -> EdsDevice:
     """Return the device that an EDS or DCF file describes.
 
     Invalid parts are skipped, and an error is added to the errors of the file. Some deviations from
-    the standard have a clear meaning, for example a missing keyword, a number with a suffix as in C
-    (`10UL`), or a text with characters outside ASCII. Such a deviation becomes a warning with the
-    value that is used.
+    the standard have a clear meaning, for example a missing or empty keyword, a number with a
+    suffix as in C (`10UL`), CompactSubObj in a RECORD, or a text with characters outside ASCII.
+    Such a deviation becomes a warning with the value that is used.
 
     The ParameterValue of a DCF is used as the power-on value. ObjFlags are ignored, because they
     concern only configuration tools. The result includes the objects that CompactPDO describes, and

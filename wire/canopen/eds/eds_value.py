@@ -330,8 +330,8 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
 
     Returns:
         The limit. It may be outside the range of the data type: a HighLimit above the range, or a
-        LowLimit below it, is returned unchanged. The result is None if values of this type have no
-        limits, or if the limit depends on the node-ID.
+        LowLimit below it, excludes no value and is returned unchanged. The result is None if values
+        of this type have no limits, or if the limit depends on the node-ID.
 
     Raises:
         ValueError: the text is not a number of at most 64 bits.

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 class ModeBit(IntEnum):
     """Bits of the statusword whose meaning depends on the mode of operation."""
 
+    # Plain numbers, which are faster than the members of a flag.
     TARGET_REACHED = Statusword.TARGET_REACHED
     MODE_12 = Statusword.MODE_12
     MODE_13 = Statusword.MODE_13

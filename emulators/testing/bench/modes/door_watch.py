@@ -272,11 +272,12 @@ class CpuWaits:
 
     Args:
         tasks: path of the folder with the threads.
-        spares_looker: whether to omit the thread that calls `look`.
+        spares_looker: whether to omit the thread that calls `look`, because it measures its own
+            delay.
 
     Attributes:
         worst_us: longest time that a thread has waited between two updates by `look`, up to now,
-            in microseconds.
+            in microseconds. Between two updates there are about `_LOOK_US`.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:

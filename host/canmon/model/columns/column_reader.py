@@ -474,8 +474,8 @@ class ColumnReader:
         """Yield the log in pieces: blocks of columns, or lists of single items.
 
         If the format of the log cannot be read as columns, all pieces are lists. In any other
-        format, a piece is a list only if it contains a CAN FD frame or a mark, because columns
-        cannot contain these. A mark is an event in the log, such as lost frames.
+        format, a piece with a CAN FD frame or a mark is a list, because columns cannot contain
+        these. A mark is an event in the log, such as lost frames.
         """
         if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()

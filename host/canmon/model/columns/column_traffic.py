@@ -60,7 +60,7 @@ def column_bits(
 
     Args:
         ident: CAN-IDs with flags, as `ident_of` returns them.
-        dlc: data length code of each frame.
+        dlc: data length code of each frame, also of remote frames.
         payload: data of each frame as a little-endian number. Missing bytes are 0.
     """
     out = np.empty(len(ident), np.int64)

@@ -79,7 +79,7 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Return a message of a serial line as one line of JSON.
+    """Return a message of a serial line as one line of JSON, in the form of an event (`ev`).
 
     `more` contains further members, each with a comma before it.
 
@@ -195,8 +195,8 @@ def csv_row(record: Record) -> str:
 
     The format of python-can contains neither the direction of a frame nor CAN FD. In the rows of
     this function, signs after the data mark them. The sign `>` marks a frame that this program
-    sent. python-can ignores this sign. The sign `#` marks a CAN FD frame, `!` marks BRS, and `*`
-    marks ESI.
+    sent. base64 does not use this sign, and python-can ignores it. The sign `#` marks a CAN FD
+    frame, `!` marks BRS, and `*` marks ESI.
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent

@@ -337,7 +337,7 @@ class Recorder:
         The result is False if the caller must pass the frames to `take` one by one.
 
         Args:
-            block: block of at least one frame.
+            block: block of at least one frame. No event may follow the frames.
             now_us: current time.
         """
         whole = self._before is None and self._wanted is None

@@ -119,8 +119,9 @@ class NodeDescription(NamedTuple):
     ) -> NodeDescription:
         """Make the description of an emulated node from its object table, without writing an EDS.
 
-        The default value of each numeric object is its value at power-on. An object whose value is
-        an empty text has no default value.
+        The result is the same as from an EDS with these objects. The default value of each numeric
+        object is its value at power-on. An object whose value is an empty text has no default
+        value.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]

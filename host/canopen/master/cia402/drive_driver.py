@@ -42,8 +42,8 @@ class DriveSettings:
     """Settings of one drive axis, as in the bus.yml.
 
     Attributes:
-        channel: settings of the joint that the axis moves, such as its name and the scales that
-            convert its values.
+        channel: settings of the joint that the axis moves, such as its name, and the scales and
+            offsets that convert its values.
         axis: number of the axis. 0 is the first axis of the device.
         switching_state: CiA 402 state to which the drive is switched before its mode of operation
             is changed.

@@ -142,7 +142,9 @@ class Orb:
     def close(self) -> None:
         """Shut the ORB down: answer the running calls, refuse other calls, and free the port.
 
-        If a call to another process does not end, the ORB stays open, and a line is logged.
+        A call to another process may not end, for example if omniORB repeats it because the process
+        has closed the connection instead of answering. If a call does not end, the ORB stays open,
+        and a line is logged.
         """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)
