@@ -207,13 +207,14 @@ class Unanswered(list[Object]):
     def fence(self, at: Object) -> Object:
         """Return an object to read next, so that late answers about object `at` can be recognized.
 
-        The server answers in order. When it answers the read of the returned object, it will send
-        no more late answers about `at`.
+        The server answers requests in their order. The host reads the returned object, and then
+        sends the new request about `at`. So each answer about `at` that arrives before the answer
+        to this read is a late answer to an earlier request.
 
         The result is an object of `FENCES`, but not `at`. If the latest request was for such an
-        object, that object is returned again, so that a node that is gone gets repeated requests
-        for the same object. Otherwise, an object without an unanswered request is returned. If
-        there is none, the oldest requests are forgotten until there is one.
+        object, this object is returned again. Otherwise, the result is an object of `FENCES`
+        without an unanswered request. If all objects of `FENCES` have unanswered requests, the
+        oldest requests are forgotten until one object has none.
         """
         last = self[-1]
         if last in FENCES and last != at:

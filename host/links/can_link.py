@@ -297,15 +297,17 @@ class BusReceiver:
     def receive(self, timeout_s: float | None) -> can.Message | None:
         """Return the next python-can message.
 
-        The result is None if no message arrives in time, or if 16 reads in a row fail. A read fails
-        if the driver raises an error or the message is not a valid frame.
+        The result is None if no message arrives in time. A read fails if the driver raises an error
+        or the message is not a valid frame. After a failed read, the method reads again. The result
+        is also None if 16 reads of one call fail in a row.
 
         Args:
             timeout_s: longest wait in seconds, or None to wait without limit.
 
         Raises:
-            LinkClosed: the connection to the bus is lost, or all reads have failed for 1 s or
-                longer, and these were at least 100 reads.
+            LinkClosed: the connection to the bus is lost. The error is also raised if at least 100
+                reads in a row have failed, in any number of calls, and the first of these reads
+                failed at least 1 s ago.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
         for _ in range(_TRIES):

@@ -112,10 +112,10 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 
     Args:
         option: name of the option. The options `--html`, `--junit`, `--badge` and `--issue` each
-            request a report in a different form. Any other name stands for the option that requests
-            a baseline file, which lists the failures of the run.
+            request a report in a different form. The option `--write-baseline` requests a baseline
+            file, which lists the failures of the run.
         report: report of the run.
-        baseline: failures that the user has declared as known.
+        baseline: failures that the user has declared as known. Only the reports use them.
         show: function that formats the recorded frames as lines.
     """
     match option:

@@ -467,9 +467,9 @@ class Consent:
         The user is not asked in these cases:
 
         - With the option `--yes`, the answer is yes.
-        - If the node is emulated in virtual time, the answer is also yes, with one exception: if
-          other nodes are on the bus, the answer to the question about LSS commands to all nodes is
-          no, because the other nodes would also answer.
+        - If the node is emulated in virtual time, the answer is also yes, with one exception. One
+          of the questions is whether to send LSS requests to all nodes of the bus. If there are
+          other nodes on the bus, the answer to this question is no.
         - In any other case, if there is no terminal, the answer is no.
         """
         if self._yes:

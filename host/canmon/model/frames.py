@@ -247,7 +247,9 @@ class CandumpFilter:
 
     @classmethod
     def parse(cls, text: str) -> CandumpFilter:
-        """Parse a filter, which is a list of words between commas such as `123:7FF,#FF`.
+        """Parse a filter, such as `123:7FF,#FF`.
+
+        The filter is a list of words, separated by commas. `CandumpFilter` describes the words.
 
         Raises:
             ValueError: a word is not a filter.
@@ -354,8 +356,9 @@ def stamp_text(
         at_us: time to write, in microseconds.
         origin_us: time of the first frame.
         before_us: time of the previous line.
-        digits: minimum numbers of digits before the decimal point: first the number for absolute
-            times, then the number for times that count from `origin_us` or `before_us`.
+        digits: two minimum numbers of digits before the decimal point. The first number is for
+            absolute times. The second number is for times that count from `origin_us` or
+            `before_us`.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']

@@ -61,9 +61,10 @@ class TimeBins(Generic[_Key]):
 
     Attributes:
         width_us: present width of a span in microseconds.
-        sums: sums of the amounts. The outer dictionary has the keys, the inner dictionaries have
-            the numbers of the spans.
-        ranges: least and greatest value in each span, in dictionaries with the same structure.
+        sums: sums of the amounts that `add` got. Each key has a dictionary with the sums by number
+            of the span.
+        ranges: least and greatest of the values that `spread_at` got. They are independent of the
+            sums. Each key has a dictionary with the two values by number of the span.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:

@@ -747,7 +747,7 @@ class Traffic:
         return TrafficSnapshot(at_us, self.buses(at_us, ended=now_us is None), rows)
 
     def buses(self, now_us: int, *, ended: bool = False) -> tuple[BusRow, ...]:
-        """Return only the rows of the buses, which takes less time.
+        """Return the rows of the buses. This takes less time than `snapshot`.
 
         Args:
             now_us: present time in microseconds.

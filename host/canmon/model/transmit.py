@@ -139,8 +139,8 @@ class FrameFields:
 def parse_counter(text: str) -> _Counter:
     """Parse the description of a counter in the data of a frame that is sent repeatedly.
 
-    `0:0..255` counts byte 0 from 0 to 255. `0.4+4:0..14` counts 4 bits of byte 0, from bit 4 on,
-    from 0 to 14.
+    With `0:0..255`, byte 0 counts from 0 to 255. With `0.4+4:0..14`, a field of byte 0 counts from
+    0 to 14. This field has 4 bits and begins at bit 4.
 
     Raises:
         ValueError: the text is not a counter, or the values do not fit the bits.

@@ -107,8 +107,9 @@ class _Screen:
         return [_ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
-        """Show lines of text, unless the terminal has not yet accepted the previous ones.
+        """Show lines of text.
 
+        If the terminal has not yet accepted the previous lines, the new lines are not shown.
         Control codes in the lines have no effect, except those of colours.
         """
         if not self._output.catches_up(_PATIENCE_S):

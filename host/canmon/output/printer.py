@@ -64,8 +64,8 @@ class FilteredDecoder:
     def learning(self, cut: LogCut) -> LogCut:
         """Let the decoder learn from the frames before the part of the log that `cut` selects.
 
-        The result is a copy of `cut` that passes these frames to the decoder. The command does not
-        print them.
+        The command does not print these frames. The result is a `LogCut` for the same part of the
+        log. With it, the reader of the log also passes the earlier frames to the decoder.
         """
         if self._decoder is None or cut.begin is None:
             return cut

@@ -93,8 +93,9 @@ def writes(
     Args:
         values: wanted value of each object, by index and sub-index.
         number: function that reads an object of the node as an unsigned number.
-        writable: objects that the host can write. Writes to other objects are left out, also those
-            that only the order needs, such as a write that disables a PDO for a time.
+        writable: objects that the host can write. Writes to other objects are left out. This
+            includes temporary writes, such as a write that disables a PDO while its parameters
+            change.
 
     Raises:
         ValueError: a COB-ID or a number of mapped objects is invalid.

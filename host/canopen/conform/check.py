@@ -344,12 +344,13 @@ class ConformancePlan:
     def may_choose(self, group: str, place: str = "") -> bool:
         """Return whether the patterns of `--only` can match a check, before the check is built.
 
-        If the result is False, the caller skips the file of the group, or the checks of the object.
+        If the result is False, the caller does not build the checks that the arguments select.
 
         Args:
             group: name of the group.
-            place: beginning of the check's id after the name of the group, such as `1017.00` for
-                the checks of the object 1017h:00.
+            place: beginning of the check's id after the name of the group. For example, `1017.00`
+                selects the checks of the object 1017h:00 in this group. An empty text selects all
+                checks of the group.
         """
         begun = f"{group}-{place}".upper()
         for pattern in map(str.upper, self.only):

@@ -258,9 +258,9 @@ class Checker(RuleCheck):
             end_us: time in microseconds at which listening ended.
             lost: messages of the source about lost frames, and about lines of a log that are not
                 frames.
-            judged_us: end of the traffic in microseconds for rules that the user wrote as
-                expressions. For frames from standard input, it is the time of the latest frame.
-                None means that it is equal to `end_us`.
+            judged_us: time in microseconds up to which rules are checked that the user wrote as
+                expressions, such as `181 every 10ms`. None means `end_us`. If the source has no
+                clock, as standard input, the caller gives the time of the latest frame.
             errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)
@@ -392,8 +392,8 @@ because this machine may not have read it yet.
 class DecodedCheck:
     """Check of frames by all rules, which decodes the frames first if a rule needs their meaning.
 
-    `canmon check` uses this class. Findings of rules that are expressions also contain the frames
-    around the violation.
+    `canmon check` uses this class. For a rule that the user wrote as an expression, such as
+    `181 every 10ms`, each finding also contains the frames around the violation.
 
     Args:
         rules: rules to check.

@@ -78,9 +78,9 @@ class AtFrames:
         return self.state(record, decoded) is True
 
     def state(self, record: AnyRecord, decoded: Decoded) -> bool | None:
-        """Return whether the tests of signals hold at a frame.
+        """Return whether a frame is selected and all signals pass their tests at this frame.
 
-        The result is None if the frame is not selected, or if a value is unknown.
+        The result is None if the frame is not selected, or if the value of a signal is unknown.
         """
         for state in self._kept:
             state.take(record, decoded)
@@ -473,9 +473,10 @@ class Toggle(RuleDemand):
 
     The toggle bit must be 0 in the first answer after a boot-up.
 
-    If the log contains requests, a frame is an answer if it follows a request. If the log contains
-    no requests, the first frame whose toggle bit is set and all later frames are answers. A node
-    that produces heartbeats is not judged, because it does not answer guarding requests.
+    If the log contains requests, a frame is an answer if it follows a request. Without requests,
+    only the toggle bit distinguishes an answer from a heartbeat. Then the first frame whose toggle
+    bit is set is an answer, and so are all later frames. A node that produces heartbeats is not
+    judged, because it does not answer guarding requests.
 
     Args:
         event: event that selects the nodes to judge. A node stays selected after its first matching
@@ -904,7 +905,8 @@ class Steps(Follow):
 class Changes(RuleDemand):
     """Demand that a value changes at least once within a given time.
 
-    A value that stays constant for longer is reported once, until it changes again.
+    If a value stays constant for longer, this is reported once. After the next change of the value,
+    it can be reported again.
 
     Args:
         event: name of a signal, or event that selects frames. Of a selected frame, the first value

@@ -167,8 +167,8 @@ class LearntBus:
         frames: requirements for the frames of each CAN-ID. Each key is a CAN-ID with the flag bits
             that `ident_of` adds.
         nodes: requirements for each node, by node-ID.
-        boot_order: node-IDs in the required order of boot-ups. Nodes in one group may boot in any
-            order.
+        boot_order: groups of node-IDs, in the required order of boot-ups. The nodes of one group
+            may boot in any order.
         bits_per_second: largest allowed bus load in bits per second, or None for no limit.
         usual: texts of the faults that occurred in the good log. Faults with these texts are not
             reported.

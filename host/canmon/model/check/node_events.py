@@ -84,10 +84,10 @@ class BeatEvent(NamedTuple):
     Attributes:
         at_us: time of the event in microseconds.
         row: row of the event.
-        kind: kind of the event. The kind `boot` is a boot-up without an NMT reset, the kind
-            `excuse` is a boot-up after an NMT reset, and the kind `order` is an NMT reset or a
-            write to 1017h. Missing heartbeats before an event of the kind `excuse` are no fault.
-            Missing heartbeats before any other event are a fault.
+        kind: kind of the event. An event of the kind `order` is an NMT reset or a write to 1017h.
+            The kind `excuse` is a boot-up after an NMT reset. Heartbeats that are missing before
+            such a boot-up are no fault. The kind `boot` is a boot-up without an NMT reset.
+            Heartbeats that are missing before an event of the kind `boot` or `order` are a fault.
     """
 
     at_us: int

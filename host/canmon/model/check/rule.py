@@ -315,9 +315,10 @@ class HeartbeatTimes(NamedTuple):
 class Heartbeat(Rule):
     """Rule that the heartbeats of one node arrive neither too early nor too late.
 
-    The first heartbeat after a boot-up may arrive at any time. For the time after the last
-    heartbeat before a boot-up, only the upper limit applies. This time ends at the NMT command that
-    has reset the node. If no NMT command has reset the node, this time ends at the boot-up.
+    The first heartbeat after a boot-up may arrive at any time. If a node stops its heartbeats and
+    boots, the time from its last heartbeat to the boot-up is compared with the upper limit only. If
+    an NMT command has reset the node, the time from the last heartbeat to this command is compared
+    instead.
 
     Args:
         times: node-ID, and limits of the time between two heartbeats.
@@ -553,9 +554,10 @@ class NoLostHeartbeat(Rule):
     """Rule that a node which sends heartbeats does not omit any.
 
     The expected period comes from 1017h in SDO traffic. If 1017h was not transferred, the measured
-    period is used, or otherwise the value from an EDS file. An NMT command that resets the node
-    ends the supervision. The boot-up starts a new supervision. If a boot-up arrives without such an
-    NMT command, the boot-up also ends the old supervision.
+    period is used, or otherwise the value from an EDS file. From an NMT command that resets the
+    node to the boot-up of the node, no heartbeats are expected. If a node boots without such a
+    command, heartbeats are expected until the boot-up. The supervision starts again at each
+    boot-up.
 
     Answers to node guarding requests, which have a toggle bit, do not count as heartbeats.
 

@@ -573,7 +573,9 @@ class _RuleParser(_QuantityParser):
     def rule(
         self,
     ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[_Slice]]:
-        """Parse the whole rule, and return its demand, scopes, signals and slices of payloads.
+        """Parse the whole rule, and return its demand, scopes, signals and frame slices.
+
+        A frame slice is a value that is defined by the position of its bits in a frame.
 
         Raise RuleError if the text is not a rule.
         """

@@ -52,7 +52,7 @@ _MARK: Final = "\x01"
 
 
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return an array of integers. The bytes of each integer are the characters of one text.
+    """Pack each text into the bytes of one integer, and return the array of integers.
 
     The array is a lookup table: numpy can take the texts of many rows from it at once by index.
 
@@ -302,8 +302,9 @@ class Scale(NamedTuple):
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
     """Return the physical values of many integers as texts.
 
-    A right text is the text that `str` gives for the value as a float. The calculation uses only
-    integers, so some texts are not right. The caller must convert these values one by one.
+    The text of a value is right if it is equal to the text that `str` gives for the value as a
+    float. This function calculates with integers, so some of its texts may be wrong. For these
+    rows, the caller must use `str`.
 
     Args:
         numbers: integers from the frames.
@@ -312,7 +313,7 @@ def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Ma
     Returns:
         The parts of the texts, and a mask. The parts are sign, digits before the decimal point,
         point, and decimals. The caller joins them row by row. The mask is True for each row whose
-        text is right.
+        text is surely right.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

@@ -744,14 +744,15 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 class Exchanges(NamedTuple):
     """Pairs of an expedited SDO request and its answer, which add no knowledge about the node.
 
-    The survey of a log that is read in blocks may skip some of these pairs. They occur, for
-    example, when a master polls one object repeatedly.
+    Such pairs occur, for example, when a master polls one object repeatedly. Of a series of pairs,
+    only the first and the last must be decoded.
 
     Attributes:
         requests: rows of the requests.
         answers: rows of the answers, in the same order.
-        inner: mask with one value for each pair. The value is True if the previous and the next SDO
-            exchange are also pairs of this node. Such a pair can be skipped without effect.
+        inner: mask with one value for each pair. The value is True if the pair is inside a series,
+            which means that the previous and the next SDO exchange with this node are pairs, too.
+            Such a pair need not be decoded.
     """
 
     requests: Ints

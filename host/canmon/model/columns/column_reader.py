@@ -98,7 +98,9 @@ class BlfBlocks:
     The parser is called with the content of a container and the start time of the log in seconds.
 
     Args:
-        channels: numbers of the buses, shared by all containers of the log.
+        channels: table of bus names, to which the parser adds the buses of a container. In the
+            returned rows, a bus is the index of its name in this table. All containers of the log
+            use one table.
     """
 
     def __init__(self, channels: ChannelNames) -> None:

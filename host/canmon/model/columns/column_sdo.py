@@ -212,8 +212,8 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames.
-            places: row of each frame of the bus in the whole block. The text of the frame has the
-                same row.
+            places: row of each frame of the bus in the block, which contains the frames of all
+                buses.
             side: sender and receiver of each frame of the bus: SDO channel, node-ID, and whether
                 the client sent the frame.
         """

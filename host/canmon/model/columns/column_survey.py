@@ -55,8 +55,9 @@ class ColumnSurvey:
     """Updates a survey from blocks of frames, with numpy, for `canmon report` and `canmon graph`.
 
     Args:
-        decoder: decoder for single frames that the survey uses. `decoder.first`, the decoders that
-            are tried before all others, may contain only DBC files.
+        decoder: decoder for single frames that the survey uses. Its attribute `first` is a list of
+            decoders that are tried before all others. This list may contain only decoders of the
+            type `DbcFile`.
         survey: survey to update. No other code may update it.
     """
 

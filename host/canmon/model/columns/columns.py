@@ -230,7 +230,8 @@ class Runs:
 class Identifiers:
     """The CAN-IDs of a bus, numbered in the order of their first frames.
 
-    With these numbers, `take` sorts one block of frames after the other by CAN-ID.
+    A CAN-ID has the same number in all blocks of frames. The method `take` sorts the frames of one
+    block by these numbers.
 
     Attributes:
         idents: CAN-IDs with flags, indexed by number.

@@ -349,8 +349,8 @@ class MissingSignals:
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
-        words: pairs of a field and a word, from comparisons in filters such as `kind=word`. No
-            built-in decoder sets the field to the word, so the word may be misspelt.
+        words: comparisons in filters such as `kind=word`, each as a pair of the field and the word.
+            They are the comparisons with words that no built-in decoder uses in this field.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -679,9 +679,9 @@ class Filter:
         matches: function that returns whether a frame passes the filter.
         signals: names of the signals in the filter, so that signals that never occur can be
             reported.
-        words: pairs of a field and a word, from comparisons in the filter such as `kind=word`. Only
-            pairs are included in which no built-in decoder sets the field to the word. Only the
-            decoder of an installed package can do this.
+        words: comparisons in the filter such as `kind=word`, each as a pair of the field and the
+            word. They are the comparisons with words that no built-in decoder uses in this field.
+            Such a word is misspelt, or the decoder of an installed package uses it.
     """
 
     text: str

@@ -587,9 +587,9 @@ class TwoBeats(NamedTuple):
 
     Attributes:
         period_us: period of each of the two heartbeats in microseconds.
-        places: indices of the gaps that show that there are two heartbeats. Such a gap between two
-            frames differs from the next gap, and both gaps together last about one period. Index n
-            is the gap after frame n.
+        places: indices of the gaps that show the two heartbeats. Gap n is the time between frame n
+            and frame n + 1. Gap n is in the list if it is longer or shorter than gap n + 1, and the
+            sum of the two gaps is about one period.
     """
 
     period_us: int

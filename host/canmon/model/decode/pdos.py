@@ -261,7 +261,9 @@ def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
 def can_id_of(pdo: NodePdo, memory: NodeMemory) -> int | None:
     """Return the CAN-ID of a PDO, or None if the PDO is not valid or its CAN-ID is unknown.
 
-    Without a known COB-ID, the CAN-ID is that of the pre-defined connection set.
+    The CAN-ID is in the COB-ID of the PDO. If the COB-ID is unknown, the CAN-ID of the PDOs 1 to 4
+    is that of the pre-defined connection set. The CAN-ID of the other PDOs is then unknown. A
+    CAN-ID of 29 bits also gives None.
 
     Args:
         pdo: PDO to look up.

@@ -349,8 +349,8 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
 def state_colour(band: Band, name: str) -> str:
     """Return the colour in which a state of a band is drawn.
 
-    Known states such as `operational` have a fixed colour. Other states get one of some free
-    colours.
+    Known states such as `operational` have a fixed colour. The other states of the band get further
+    colours, in the order in which the states first appear.
 
     Args:
         band: band that contains the state.

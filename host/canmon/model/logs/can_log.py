@@ -583,8 +583,9 @@ _MARKS: Final = "marks of gaps and triggers"
 class CanLogWriter:
     """Writer of a log in one of the formats that python-can writes, such as ASC or BLF.
 
-    These formats have numbers in place of bus names. The bus `can3` gets the number 3. A bus whose
-    name is not `can` and a number gets a free number, and `messages` reports this number.
+    These formats have numbers in place of bus names. A name such as `can3` contains a number. The
+    bus `can3` gets the number 3. A bus with another name gets a free number, and `messages` reports
+    this number.
 
     Raises:
         LogError: python-can cannot write the format on this machine.

@@ -99,8 +99,9 @@ class ScreenClock:
             it counts from the first frame (`-t z`).
 
     Attributes:
-        shift_us: offset in microseconds that `counted_us` adds to the time stamps of other logs,
-            which are counters of a CAN adapter. The offset prevents times below 0.
+        shift_us: offset in microseconds for the method `counted_us`. This method converts the time
+            stamps of GVRET logs, which are counters of a CAN adapter. With the offset, no time is
+            below 0, and the times increase when the counter overflows.
     """
 
     def __init__(self, deltas: bool = False) -> None:
@@ -637,7 +638,8 @@ _NUMBERLESS: Final = "canX"
 def bus_name(number: str) -> str:
     """Return the name of a bus for its number in a log, such as `can0` for the number 1.
 
-    For the number 0, the name is literally `canX`. A text that is not a number raises ValueError.
+    Bus numbers in logs begin at 1. The number 0 stands for no bus, and its name is `canX`. If the
+    text is not a number, ValueError is raised.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

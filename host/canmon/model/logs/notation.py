@@ -193,10 +193,9 @@ _DUMPED: Final = re.compile(
 def csv_row(record: Record) -> str:
     """Return a frame as a row of a CSV log, in the format of python-can with additions.
 
-    The format of python-can contains neither the direction of a frame nor CAN FD. In the rows of
-    this function, signs after the data mark them. The sign `>` marks a frame that this program
-    sent. base64 does not use this sign, and python-can ignores it. The sign `#` marks a CAN FD
-    frame, `!` marks BRS, and `*` marks ESI.
+    The format of python-can contains neither the direction of a frame nor CAN FD. This function
+    adds signs after the data. The sign `>` marks a frame that this program sent. The sign `#` marks
+    a CAN FD frame, `!` marks BRS, and `*` marks ESI. python-can ignores these signs.
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent

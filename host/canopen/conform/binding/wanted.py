@@ -101,8 +101,9 @@ class WantedObject(NamedTuple):
         """Return the objects of a node that can take the place of this name, in the given order.
 
         A check contains the name in place of an index and sub-index. The run replaces the name by
-        one of these objects. If the checks write to the object, a communication object is left out
-        if CiA 301 does not allow all values between its limits.
+        one of these objects. If checks write to the name, they may write any value between the
+        limits of the object. Then a communication object (1000h to 1FFFh) is in the result only if
+        CiA 301 allows all these values.
         """
         # One loop without function calls, which took a tenth of the time of a single check.
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE

@@ -61,7 +61,7 @@ class SdoClient:
 
         Raises:
             SdoAborted: the node refuses the request.
-            SdoTimeout: the node does not answer both requests.
+            SdoTimeout: the node answers neither the first nor the repeated request.
             SdoMisnamed: the answer of the node names another object.
             LinkClosed: the connection to the bus is lost.
         """

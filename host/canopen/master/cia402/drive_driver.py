@@ -114,7 +114,8 @@ async def home(
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
         caught_up: function that returns an operation to await. The operation ends when the drive
-            has received the latest controlword and then sent a statusword.
+            has received the latest controlword and has then sent a statusword. So this statusword
+            does not show the state before the controlword.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
