@@ -380,8 +380,6 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     def finalize(self) -> None:
         """End the component for good, and run the callbacks for its end.
 
-        This is transition M11 of the life cycle.
-
         Afterwards the node sends nothing until its supply has been cut and restored.
         """
         if self.state in _ENDING:

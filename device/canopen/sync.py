@@ -168,11 +168,12 @@ _PRODUCES: Final = nmt.FLAG_30
 
 
 class TimeStamp(Service):
-    """Receives or sends the time of day (TIME), and keeps a clock that runs on from it.
+    """Receives or sends the time of day (message TIME), and keeps a clock with the time of day.
 
     If bit 31 of 1012h is set, the slave receives TIME. `node.time_of_day` is the time stamp that
-    was received last, and `now` is the time of the clock. If bit 30 is set, the application may
-    send TIME by `produce`. Invalid times of day are ignored.
+    was received last, and `now` is the present time of day of the clock, which continues from that
+    time stamp. If bit 30 is set, the application may send TIME by `produce`. Invalid times of day
+    are ignored.
 
     Not emulated: the error of a real clock; high resolution time stamps (1013h).
     """

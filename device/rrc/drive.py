@@ -97,12 +97,13 @@ class Gearbox:
     def drive(
         self, tick: int, mode: int, stick: tuple[int, int], shaped: tuple[int, int], knobs: Joystick
     ) -> tuple[int, int]:
-        """Return the translation and rotation that the gear allows in one tick.
+        """Return translation and rotation for one tick, limited by the reverse mode and the gear.
 
         Args:
             tick: number of the tick.
-            mode: reverse mode 0 to 3 (see `Gearbox`), which parameter #7 of the command `joystick`
-                or the buttons set.
+            mode: reverse mode 0 to 3, which determines the movement when the stick is pulled back
+                (see `Gearbox`). Parameter #7 of the command `joystick` or the buttons set this
+                mode.
             stick: translation and rotation of the stick as received. The angle of the stick
                 determines the gear.
             shaped: the same translation and rotation after `shape`. The result is computed from
@@ -238,7 +239,7 @@ class Drive:
 
     Attributes:
         out_pct: translation and rotation of the latest tick, -100..100 %.
-        gearbox: the imitated gear change.
+        gearbox: gear, forward or backward, that the RRC imitates in reverse modes 2 and 3.
         by_stick: whether the stick drives the motors.
     """
 

@@ -40,8 +40,8 @@ class ThermalModel(Part):
     The heat is R I^2, and R is a linear function of the temperature. For a constant mean square of
     the current, a formula gives the temperatures at any later time, without steps in between.
 
-    The model does not include heat from friction and iron, the gear, the power stage and moving
-    air.
+    The model does not include the heat from friction and from iron losses. It also does not include
+    the gear, the power stage, and the effect of moving air.
     """
 
     __slots__ = ("_capacities", "_motor")

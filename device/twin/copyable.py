@@ -15,10 +15,12 @@ T = TypeVar("T")
 class Immutable:
     """Base class of objects that never change after creation, such as descriptions.
 
-    Copies of a machine within the process share such an object. A pickle contains its value.
+    If an emulated device (a machine) is copied within the process, the original and the copy share
+    such an object. A pickle contains the value of the object.
 
     Attributes:
-        shared_by_twins: flag that is always true. The code that copies a machine reads it.
+        shared_by_twins: flag that is always true. The code that copies machines reads it, and
+            shares the object instead of copying it.
     """
 
     # A class in `tickrig.wire` has the flag itself instead of this base class, because that package

@@ -221,8 +221,8 @@ class ScipServer(Part):
     Until a host switches to SCIP 2.0, the server executes the commands of SCIP 1.1
     (`first_protocol`).
 
-    The command DB, the mode for firmware updates, and the statuses 21..49 and 98 of a self-test are
-    not emulated.
+    The SCIP command `DB`, the mode for firmware updates, and the statuses 21..49 and 98 of a
+    self-test are not emulated.
 
     Args:
         parameters: parameters of the sensor.

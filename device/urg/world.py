@@ -226,8 +226,8 @@ class Beams(Part):
         y_m: position of the sensor in y, in metres.
         rays: directions of the beams as unit vectors. Each direction is `tau / turn` after the
             previous one.
-        first_rad: direction of the first beam, in radians, -2e6..2e6. More than one full turn is
-            allowed.
+        first_rad: direction of the first beam in radians. It may be more than one full turn, but at
+            most 2e6 radians in each direction.
         turn: number of beams in a full turn. `rays` has at most this number.
     """
 

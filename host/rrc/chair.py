@@ -95,8 +95,7 @@ class Guard:
     Attributes:
         watchdog_us: time without a command, in us, after which the RRC stops the wheelchair. 0
             switches this watchdog off.
-        stable: whether the RRC's stablemode is switched on, in which each line has a checksum
-            (CHECK).
+        stable: whether the RRC's stablemode is switched on. In stablemode each line has a checksum.
     """
 
     watchdog_us: int = 500_000
@@ -245,7 +244,7 @@ class Chair(Closing):
         self.client.close()
 
     def leave_driving(self) -> None:
-        """Let the stick continue to drive after the end of the program, without a watchdog."""
+        """Let the wheelchair's stick drive on after the end of the program, without a watchdog."""
         self.moved = False
 
     def _leave(self) -> None:
@@ -322,7 +321,12 @@ class Chair(Closing):
         self.watch()
 
     def drive_by_stick(self, limit: Limit, speed_mode: int = 1) -> None:
-        """Let the stick drive within limits, in a speed mode from 1 (slowest) to 5."""
+        """Let the wheelchair's stick drive.
+
+        Args:
+            limit: limits of the translation and the rotation that the stick commands.
+            speed_mode: speed mode of the RRC, from 1 (slowest) to 5.
+        """
         self.require_on()
         self.moved = True
         self._sent = None

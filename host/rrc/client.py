@@ -158,7 +158,7 @@ class RrcClient(Closing):
 
     @property
     def load(self) -> RrcLoad:
-        """Processing load that this client causes in the RRC, and the highest rate of lines."""
+        """Load that this client causes in the RRC, and the maximum rate at which it sends lines."""
         return self._channel.load
 
     def resume(self) -> None:
@@ -291,8 +291,8 @@ class RrcClient(Closing):
         Args:
             v_pct: translation in -100..100 %, forward positive.
             w_pct: rotation in -100..100 %, right positive.
-            confirm: whether to wait for the confirmation. By default, the client waits with
-                stablemode off, and does not wait with stablemode on.
+            confirm: whether to wait for the confirmation. The default depends on stablemode: if it
+                is off, the client waits; if it is on, the client does not wait.
         """
         self.command(cmd.Output(v_pct, w_pct), confirm=confirm)
 

@@ -34,9 +34,10 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return the translation and rotation to drive, in per cent: 0 while no button is held.
+        """Return the translation and rotation to drive, in per cent.
 
-        The method raises ChairStopped if the game pad is gone.
+        Both are 0 while no dead-man button of the game pad is held. The method raises
+        ChairStopped if the game pad is gone.
         """
         ...
 
@@ -71,10 +72,10 @@ class PilotView:
 
 
 class Pilot:
-    """Driver of a wheelchair that one thread runs while the screen's thread gives it requests.
+    """Drives a wheelchair in one thread, as another thread requests.
 
-    One thread calls `step` repeatedly. Another thread, such as that of `ChairPanel`, calls the
-    other methods and reads `view`.
+    The driving thread calls `step` repeatedly. The other thread, such as the thread of
+    `ChairPanel`, calls the other methods and reads `view`.
 
     Args:
         chair: chair to drive.

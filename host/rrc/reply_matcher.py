@@ -153,9 +153,9 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """Time in us until which the RRC may answer commands that were sent before its restart.
+        """End of the time, in us, in which the RRC may answer commands from before its restart.
 
-        The time is 0 if no such command waits for an answer.
+        The value is 0 if no such command waits for an answer.
         """
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
@@ -176,8 +176,8 @@ class _UnconfirmedCommands:
         which is removed.
 
         Returns:
-            The newest of these commands, because its values will apply. None if no command with
-            this name is waiting.
+            The command with this name that was sent last. The RRC executes it last, so its values
+            will apply. None if no command with this name is waiting.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:
@@ -210,10 +210,10 @@ class _UnconfirmedCommands:
 
 
 class ReplyMatcher:
-    """Assigns each reply of the RRC to the answered command, and records the settings of the RRC.
+    """Finds the command that a reply of the RRC answers, and records the settings of the RRC.
 
     Args:
-        max_refusals: number of refusals in a row that counts as too many, 1 or more.
+        max_refusals: number of refusals in a row after which the client stops sending, 1 or more.
 
     Attributes:
         settings: settings of the RRC, as far as known from confirmed commands.

@@ -476,8 +476,9 @@ class ExecutionContexts:
     time.
 
     Attributes:
-        quiet_us: time in us of the latest tick in which no context was due. The contexts are not
-            called in such a tick. They read their present time `now_us` from here.
+        quiet_us: time in us of the latest tick in which no context was due. In such a tick the
+            group does not call its contexts. Therefore the `now_us` of a context reads this
+            attribute.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")

@@ -88,7 +88,7 @@ class Parameter(Generic[V]):
             least one element. Its type is the type of all values of the parameter.
         constraint: constraint on the values in OpenRTM's notation, such as `0<=x<=10`.
         unit: unit of the value, for display.
-        widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
+        widget: widget with which an editor shows the parameter, such as `text` or `radio`.
 
     Attributes:
         value: present value, which changes only between callbacks of the component.
@@ -236,7 +236,7 @@ class Configuration:
                 type is the type of all values of the parameter.
             constraint: constraint on the values, such as `0<=x<=10` (`Constraint`).
             unit: unit of the value, for display.
-            widget: widget with which an editor shows the parameter, such as `text` or `slider.10`.
+            widget: widget with which an editor shows the parameter, such as `text` or `radio`.
 
         Returns:
             The parameter. Its attribute `value` is the present value.

@@ -28,8 +28,9 @@ class WireType(StrEnum):
 class Place(StrEnum):
     """Where a trace was recorded: at the emulated devices, or at the port of the host.
 
-    At the devices (`DEVICE`), the times in the trace are times of ticks. At the port with which a
-    host is connected (`PORT`), they are the times of the traffic at this port.
+    At the devices (`DEVICE`), the times in the trace are the times of ticks (the time steps of the
+    devices). At the port with which a host is connected (`PORT`), they are the times of the traffic
+    at this port.
     """
 
     DEVICE = "device"

@@ -121,7 +121,8 @@ class BenchParser:
         """Parse the lines of the trace, and yield one record for each; times must not decrease.
 
         Raises:
-            TraceError: a line is damaged, an earlier time follows, or a line follows the end mark.
+            TraceError: a line is damaged, a line has an earlier time than the line before it, or a
+                line follows the end mark.
         """
         made, known, before_us, ended = tuple.__new__, self._known, 0, False
         for number, line in enumerate(lines, 2):

@@ -21,7 +21,7 @@ _TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
-    """Return bytes as printable ASCII text, with escapes for all other bytes.
+    """Return bytes as ASCII text, with an escape for each byte that is not printable ASCII.
 
     A blank at the beginning or end is also escaped, so that it is visible.
     """

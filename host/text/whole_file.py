@@ -87,7 +87,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
     another special file is written directly.
 
     Raises:
-        OSError: the file cannot be written. Its `filename` is `path`, and the file is unchanged.
+        OSError: the file cannot be written. The attribute `filename` of the exception is `path`,
+            and the file is unchanged.
     """
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as beside:

@@ -19,9 +19,8 @@ class DigitalObjects(NamedTuple):
     """Indices of the objects that contain one property of digital lines, such as their polarity.
 
     CiA 401 has objects of several widths for the same lines: a sub-index contains one line, or 8,
-    16 or 32 lines. One object has at most 128 sub-indices with one line each. Therefore eight
-    consecutive objects contain single lines. `single` is the index of the first of these eight
-    objects.
+    16 or 32 lines. For single lines there are eight consecutive objects, each with at most 128
+    lines. `single` is the index of the first of these eight objects.
     """
 
     single: int

@@ -83,9 +83,9 @@ class Epos(Ds402):
     """A Maxon EPOS drive: a CiA 402 drive with Maxon's own modes, units and error codes.
 
     Velocities are in revolutions of the motor per minute, accelerations in revolutions per minute
-    per second, positions in counts of the motor's encoder. Bit 8 of the statusword (the offset of
-    the current measurement is known) is always set. Bit 15 means that the position refers to a home
-    position.
+    per second, positions in counts of the motor's encoder. Bit 8 of the statusword (offset of the
+    motor current measurement is known) is always set. Bit 15 means that the position refers to a
+    home position.
 
     The gains of the control loops, the digital and analogue inputs, the modes "master encoder" and
     "step", and RS232 are not emulated.

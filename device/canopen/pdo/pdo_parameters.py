@@ -210,10 +210,11 @@ class SynchronousAcyclic(TpdoMode):
 
 
 class SynchronousCyclic(TpdoMode):
-    """Transmission types 1 to 240: the TPDO is sent with every n-th SYNC, counted from the start.
+    """Transmission types 1 to 240: the TPDO is sent with every n-th SYNC.
 
-    If a SYNC start value is set and SYNC has a counter, the TPDO is sent first with the SYNC whose
-    counter has that value, as in CANopenNode.
+    The SYNCs are counted from the moment when the TPDO becomes active. If a SYNC start value is set
+    and SYNC has a counter, the TPDO is sent first with the SYNC whose counter has that value, as in
+    CANopenNode.
     """
 
     __slots__ = ("_left", "_period", "_start")

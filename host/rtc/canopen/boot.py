@@ -29,7 +29,7 @@ _PROBE_US: Final = 1_000_000
 
 
 def probe() -> Script[None]:
-    """Script that requests the device type of a node repeatedly until the node answers.
+    """Script (generator of SDO requests) that requests a node's device type until the node answers.
 
     An SDO abort is an answer too.
     """

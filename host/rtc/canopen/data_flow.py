@@ -58,9 +58,10 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Keep the tables of `route` up to date for a new proxy.
+        """Keep the tables of PDOs and ports up to date for a new proxy.
 
-        The tables are rebuilt now, and whenever an InPort of the proxy gets or loses a connector.
+        `route` rebuilds the tables now, and whenever an InPort of the proxy gets or loses a
+        connector.
         """
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:
@@ -122,9 +123,10 @@ class SdoDataFlow:
     """Transfer of values between objects of devices and ports by SDO.
 
     Objects are read for OutPorts of the proxies, and values at InPorts are written to objects.
-    Values are transferred while the proxy is Active and its device is Operational. For each port,
-    at most one value is transferred per period. If the transfers of a proxy take longer than a
-    period, the next ones begin in the first period after their end.
+    Values are transferred while the proxy is Active and its device is Operational. The server runs
+    the proxies periodically, and for each port at most one value is transferred per period. If the
+    transfers of a proxy take longer than a period, the next transfers of this proxy begin in the
+    first period after the end of the earlier ones.
 
     Args:
         nodes: nodes by node-ID.
@@ -155,7 +157,7 @@ class SdoDataFlow:
                 self._begin(now_us, node, self._transfer(node, proxy, sinks, sources))
 
     def put(self, name: str, value: Struct) -> ReturnCode | None:
-        """Give an InPort a value without a connector. The device gets the value in the next period.
+        """Write a value to an InPort directly. The device gets the value in the next period.
 
         Returns:
             RTC_OK if the value was accepted, BAD_PARAMETER if it does not fit the object,

@@ -170,7 +170,7 @@ class NodeEntry:
         heartbeat_ms: producer heartbeat time of the node.
         ports: names of ports by PDO. The key for the second TPDO is `tpdo2`.
         pdos: parameters that are written into PDOs, by PDO.
-        restart: maximum number of successive restarts after the node was lost.
+        restart: maximum number of times in a row that the server restarts the node after its loss.
         sdo_ports: ports of objects that are transferred by SDO, by name.
     """
 
@@ -307,8 +307,8 @@ class DeviceFile:
             node-ID is not added here.
         data_types: data types by index and sub-index.
         pdos: indices of the PDO communication parameters of the device.
-        relative: keys in `defaults` of the values that depend on the node-ID. A device adds its
-            node-ID to these values.
+        relative: index and sub-index of each value in `defaults` that depends on the node-ID. A
+            device adds its node-ID to the value.
         findings: errors in the file. Objects with errors are not used.
         mappable: objects that the PDOs of the device can carry.
     """

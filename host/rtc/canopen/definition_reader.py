@@ -126,7 +126,7 @@ def _checked(allows: Callable[[Any], bool], what: str) -> _Reader:
 
 
 def whole(low: int, high: int) -> _Reader:
-    """Return a function that reads and checks a whole number of a definition.
+    """Return a function that reads and checks one integer in a definition.
 
     The number is written in decimal or as 0x...
 

@@ -68,7 +68,7 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Check a System Definition without a bus.
 
     The check assumes that the nodes match their EDS. It does not check nodes whose EDS lacks
-    values, or components that do not exist.
+    values, or connections with components that the server does not have.
 
     Args:
         server: server that has the System Definition. The check adds proxies to it although there

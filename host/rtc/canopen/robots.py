@@ -18,7 +18,7 @@ _FULL_PCT: Final = 100.0
 
 
 class Joystick(RtComponent):
-    """Component that writes the velocity of a simulated joystick in each period.
+    """Simulated joystick, which writes the requested velocity to an OutPort in each period.
 
     Attributes:
         velocity: OutPort with the forward velocity in m/s, and the angular velocity to the left in

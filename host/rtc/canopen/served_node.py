@@ -108,8 +108,7 @@ class DuplicateNodeDetector:
         Args:
             at_us: time of the frame on the bus in us.
             state: NMT state in the frame.
-            listening: whether the server waits, after a boot-up, for frames of a second node. It
-                has sent nothing to the node since the boot-up.
+            listening: whether the server waits, after a boot-up, for frames of a second node.
         """
         before, self._state = self._state, state
         if state is NmtState.INITIALISING:

@@ -14,7 +14,7 @@ from tickrig.host.rtc.commands.verbs import SYSTEM_VERBS, VERBS, conf
 
 @click.group()
 def rtc() -> None:
-    """Run RT components, and work with them while they run, in the manner of rtshell.
+    """Run RT components, and work with them while they run.
 
     Components are named ConsoleIn0 or localhost/ConsoleIn0.rtc. Ports are named ConsoleIn0.out or
     localhost/ConsoleIn0.rtc:out.
@@ -29,7 +29,8 @@ def rtc() -> None:
     tickrig rtc edit                                 all of it on the screen
 
     The exit status is 0 for success. It is 1 if a component did not reach the requested state, or
-    if check found a difference. It is 2, with a message of one line, if a request was refused.
+    if the command `check` found a difference. It is 2, with a message of one line, if a request was
+    refused.
     """  # noqa: D301 - click wants the backspace
 
 

@@ -280,7 +280,7 @@ def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
 def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: str) -> None:
     """Connect the ports FIRST and SECOND.
 
-    Keys of properties may have `dataport.` before them, or not.
+    You may leave out the prefix `dataport.` of a property key.
 
     \b
     tickrig rtc con ConsoleIn0.out ConsoleOut0.in
@@ -448,7 +448,7 @@ def save(at: Path, file: Path | None) -> None:
 @as_json
 @at
 def status(at: Path, as_json: bool) -> None:
-    """Show the state of the run: time and late ticks.
+    """Show the number of components, the time of the system, and how many ticks began late.
 
     \b
     tickrig rtc status --json
@@ -511,8 +511,9 @@ def edit(at: Path) -> None:
     """Show the system as a picture on the terminal, and change it (extra tickrig[tui]).
 
     The picture has boxes with ports, and a wire for each connector. Arrows move from port to port.
-    The keys a, d and r activate, deactivate and reset. The key m marks a port, c connects it, x
-    disconnects. Tab goes to the configuration, and e edits it. F1 shows the keys.
+    The keys a, d and r activate, deactivate and reset. The key m marks a port. The key c connects
+    the marked port with the port under the cursor, and x disconnects. Tab goes to the
+    configuration, and e edits it. F1 shows the keys.
 
     \b
     tickrig rtc edit

@@ -35,9 +35,10 @@ class _Answer:
 
 
 class SystemLink:
-    """Link of the editor to a running system, whose thread reads the state and sends the requests.
+    """Link of the editor to a running system.
 
-    The link connects again if the connection breaks, because the system may be restarted or
+    The link has its own thread, which reads the state of the system and sends requests to the
+    system. The link connects again if the connection breaks, because the system may be restarted or
     replaced.
 
     Args:
@@ -60,7 +61,7 @@ class SystemLink:
     def request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object
     ) -> None:
-        """Queue a request to the system. `take_answers` returns its result later.
+        """Queue a request to the system. `take_answers` returns the result of the request later.
 
         Args:
             do: name of the request, such as `activate`.

@@ -32,8 +32,9 @@ def engines_joined(
     Args:
         options: engines to use, with their settings.
         manager: manager of the system, which is not running yet.
-        attach: function that is called with a new queue of calls. It must make the manager's thread
-            execute the calls in this queue.
+        attach: function that is called once with a `CallQueue`. In this queue, the engines store
+            their calls to the manager. The function must make the manager's thread execute these
+            calls.
         stop: function that ends the command. It is called if another process requests the end.
         fixed: whether other processes must not create or end components of this system.
 

@@ -80,7 +80,7 @@ _SEND_LENGTH: Final = "64"
 class Codec(Generic[T, P]):
     """Pair of functions that convert values for the transfer to another process, and back.
 
-    The converted form is bytes, or a message of an engine.
+    The converted form is bytes, or a message object of the middleware (such as ROS 2).
 
     Attributes:
         encode: function that converts a value for the transfer. It raises ValueError if that is not
@@ -184,9 +184,9 @@ class _ArrivalBuffer(RingBuffer[P]):
         Any thread may call.
 
         Returns:
-            The first value is the status that `write` would return. The second value is whether the
-            caller must make the manager's thread call `let_in`. This is so if no other value was
-            waiting.
+            The first value is the status that `write` would return. The second value is True if the
+            added value is the only waiting value. In this case the caller must make the manager's
+            thread call `let_in`.
         """
         options = self._options
         with self._lock:

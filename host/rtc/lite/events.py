@@ -134,10 +134,7 @@ class PingMonitor:
         return self._ping(now_us)
 
     def let_go(self) -> None:
-        """Stop waiting for the answer to a routine PING, so that a request can be sent.
-
-        The reply to the request will show as well that the device is present.
-        """
+        """Stop waiting for the answer to a routine PING, so that a request can be sent."""
         if self.pending:
             self.awaiting = False
             self._count_missed()

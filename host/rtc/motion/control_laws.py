@@ -120,7 +120,7 @@ class Regulator:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSpin:
-    """Control law for a cart that turns on the spot to a heading, as in the reference hardware.
+    """Control law of Reference Hardware 3 (RH3) for a cart that turns on the spot to a heading.
 
     Attributes:
         alpha: angular acceleration in rad/s2.

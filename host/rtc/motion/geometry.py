@@ -65,7 +65,7 @@ def clip(value: float, limit: float) -> float:
 
 
 class Wheels(NamedTuple):
-    """Geometry of a cart that an odometry uses: the wheel radii and the axle length in m."""
+    """Wheel radii and axle length of a cart in m, which its odometry needs."""
 
     left: float
     right: float

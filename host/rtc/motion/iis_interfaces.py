@@ -51,8 +51,8 @@ class _Adapter(RtComponent, Generic[S, T]):
 class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
     """Component that converts velocity commands from phase 1 to phase 2 of the IIS interfaces.
 
-    IIS are the common interfaces of mobile robots. They exist in three phases. Each phase has its
-    own data types.
+    IIS is a set of interfaces that the components of different mobile robots have in common. There
+    are three versions of IIS, called phase 1, 2 and 3. Each of them has its own data types.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")

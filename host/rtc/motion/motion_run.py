@@ -25,7 +25,8 @@ class TrackSample(NamedTuple):
         time_s: time since the start of the record in s.
         pose: pose of the cart.
         twist: commanded velocity.
-        line: end of the line that the cart follows, or None while it turns or stands.
+        line: pose at the end of the straight line that the cart follows, or None while the cart
+            turns or stands.
     """
 
     time_s: float

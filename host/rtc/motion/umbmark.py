@@ -88,7 +88,7 @@ def run_umbmark(
             activate the components.
         true_pose: function that measures the position of the cart at the end of a run.
         runs: number of runs in each direction.
-        side_m: side length of the squares in m. UMBmark has 4 m.
+        side_m: side length of the squares in m. The original UMBmark test has squares of 4 m.
         watch: function that is called with each sample.
 
     Raises:

@@ -198,7 +198,8 @@ class _Publisher(Generic[T]):
 
         If no value waits, the time is `NEVER`. If a value waits, the time depends on the
         subscription type of the connector. With `new`, the time is 0, which means at once. With
-        `periodic`, the time is 0 until a tick has planned the push. Then it is the planned time.
+        `periodic`, the next tick plans the push. Before this tick the time is 0. After this tick
+        the time is the planned time.
         """
         if not len(self._values):
             return NEVER
@@ -273,7 +274,8 @@ class Connector(ConnectorBase, Generic[T]):
 
         If no value waits, the time is `NEVER`. If a value waits, the time depends on the
         subscription type of the connector. With `new`, the time is 0, which means at once. With
-        `periodic`, the time is 0 until a tick has planned the push. Then it is the planned time.
+        `periodic`, the next tick plans the push. Before this tick the time is 0. After this tick
+        the time is the planned time.
         """
         return self._publisher.due_us if self._publisher else NEVER
 

@@ -31,8 +31,9 @@ class CallQueue:
     Other threads use it because only the manager's thread may access a manager. The manager's
     thread executes the calls in one of two ways. With a `ServingClock`, the clock calls `serve`
     while it waits for the next tick. With a `LineServer` (the server of a control socket), the
-    thread calls `server.attach(queue, queue.make)` once. The server then calls `queue.make`
-    whenever calls wait.
+    thread calls `server.attach(queue, queue.make)` once. From then on, the server watches the queue
+    while it waits for clients. When the queue contains calls, the server calls `queue.make`, which
+    executes them.
     """
 
     def __init__(self) -> None:

@@ -21,7 +21,7 @@ class SourceStatus(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """Result of a request that a `Source` has ended.
+    """Result of a finished request to a `Source`.
 
     Attributes:
         address: address that was requested.
@@ -68,7 +68,7 @@ class CacheLimits:
         fresh_us: age in us after which an entry is requested again. It remains in use until the
             answer arrives.
         keep_us: age in us after which an entry is no longer used.
-        unknown_us: time in us before an unknown ucode is requested again.
+        unknown_us: time in us before an address at which nothing was found is requested again.
         retry_us: time in us before a failed request is repeated.
     """
 

@@ -48,8 +48,7 @@ class ContentsInterpretation(Lookup[Contents]):
     - `place` out: the ucode, then `name=value` of each property
 
     The information at an address is a JSON object with the numbers `x_m` and `y_m`. Its other
-    members are properties. The NEDO report (Fig. 123) only names the component and its cache.
-    tickrig has defined the ports and the JSON object.
+    members are properties. tickrig has defined the ports and the JSON object.
 
     Args:
         instance_name: name of the component.

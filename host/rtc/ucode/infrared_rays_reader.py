@@ -26,7 +26,7 @@ _SILENCE_US: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Result of one round of an infrared reader: the ucode markers that it received.
+    """The ucode markers that an infrared reader received in one round, a period of 100 ms.
 
     Attributes:
         number: number of the round in the counter of the reader, 0..65535.

@@ -193,10 +193,9 @@ class EdsFile:
     def word(self, section: str, key: str) -> str:
         """Return the value of a keyword that is a number or a word, without a trailing comment.
 
-        In CiA 306 a comment is a line of its own, but many programs also accept a comment that
-        begins with ` ;` after a value. After a number or an access type, `;`, `#` and `//` begin a
-        comment, because these characters have no other meaning there. Such a comment becomes a
-        warning.
+        A trailing comment begins with `;`, `#` or `//`. These characters have no other meaning
+        after a number or an access type. In CiA 306 a comment is a line of its own. Therefore each
+        trailing comment adds a warning to the findings.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)

@@ -27,7 +27,7 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 def build(project: Project) -> dict[str, str]:
     """Generate all files for a DeviceRTC, such as its EDS and the skeleton of its component.
 
-    A DeviceRTC is an RT component inside a CANopen slave.
+    A DeviceRTC is a robot technology component (RT component) inside a CANopen slave.
 
     Returns:
         The text of each file, by file name.

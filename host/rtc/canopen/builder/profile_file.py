@@ -107,8 +107,8 @@ class Project:
     Attributes:
         profile: component with its ports.
         node_id: node-ID in the System Definition.
-        strict_cia301: whether an NMT command can move the component out of its Error state, as in
-            CiA 301 (DECISION K9).
+        strict_cia301: whether the NMT commands Start and Enter Pre-operational end the component's
+            Error state, as in CiA 301. By default, only a reset ends this state.
     """
 
     profile: RtcProfile

@@ -48,7 +48,7 @@ class ServerControl(SystemControl):
     """Answers the requests to the control socket of a CANopen server and its nodes.
 
     Args:
-        server: server to control. The server must not tick during a request.
+        server: server to control. Its method `tick` must not run during a request.
         runner: runner of the server.
         bus: name of the bus.
     """

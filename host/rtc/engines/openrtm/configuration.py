@@ -29,8 +29,8 @@ class ConfigurationServant:
     the next period. Two more sets, `__widget__` and `__constraints__`, describe the parameters to
     editors. These sets cannot be changed.
 
-    Two parts of the IDL are not emulated: parameters that belong to no set, and the operations by
-    which other processes add services and organizations (Super Distributed Objects of the OMG).
+    Two parts of the IDL are not emulated: parameters that belong to no set, and the operations that
+    add service profiles and organizations (groups of components).
 
     Args:
         configuration: configuration to serve.

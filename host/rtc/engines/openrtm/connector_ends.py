@@ -433,7 +433,8 @@ class ServiceEnd(ConnectorEnd):
     def publish(self, values: dict[str, str]) -> dict[str, str]:
         """Serve the interfaces of the local port, and return the properties that refer to them.
 
-        Each interface has two properties, so that OpenRTM 1.0 and later versions find it.
+        Two properties refer to each interface. One has the name that OpenRTM 1.0 uses. The other
+        one has the name that later versions of OpenRTM use.
         """
         found: dict[str, str] = {}
         for provider in self._port.providers:

@@ -154,9 +154,9 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Prepare the end of a connection that the peer or a tool has requested.
+        """Prepare to end a connection, because the peer or a tool has requested this.
 
-        The peer already knows that the connection ends. So it will not be notified.
+        The peer will not be notified of the end of the connection.
 
         Returns:
             The first value is the connection to a peer, or None if no such connection has this ID.

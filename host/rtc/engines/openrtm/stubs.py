@@ -46,8 +46,8 @@ class Stubs:
         rtc: IDL module `RTC`.
         openrtm: IDL module `OpenRTM`, with the component and data ports.
         rtm: IDL module `RTM`, with the manager.
-        services: module with the interface `RefHard` of the RH3 base (Reference Hardware 3). In the
-            IDL, this interface is in no module.
+        services: Python module with the interface `RefHard` of the RH3 base (Reference Hardware 3).
+            The IDL defines this interface outside of all IDL modules.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:

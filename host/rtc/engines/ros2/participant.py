@@ -181,7 +181,7 @@ def _qos_of(entry: TopicEntry) -> Qos:
 
 
 def reason_of(error: DDSException) -> str:
-    """Return the reason of a DDS exception as text, without names from the code of DDS."""
+    """Return the reason of a DDS exception as text, without the error code before it."""
     return str(error).partition("]")[2].strip() or str(error)
 
 
@@ -237,8 +237,8 @@ class ForeignEndpoints:
 
     Args:
         participant: participant in the DDS domain.
-        writing: endpoints that write topics in this process, which may change.
-        reading: endpoints that read topics in this process, which may change.
+        writing: writers of this process by DDS name of the topic. The mapping may change later.
+        reading: readers of this process by DDS name of the topic. The mapping may change later.
     """
 
     def __init__(

@@ -48,7 +48,10 @@ _HOLD_US: Final = 300_000
 
 
 class KeyboardPad:
-    """Game pad simulated by terminal keys: w s forward/back, a d turn, q e sideways, space stop.
+    """Game pad that the keys of a terminal simulate.
+
+    The keys w and s drive forward and back. The keys a and d turn left and right. The keys q and e
+    drive sideways to the left and right. The space bar stops.
 
     Args:
         fd: file descriptor of the terminal. By default, it is standard input.

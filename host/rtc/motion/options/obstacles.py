@@ -240,7 +240,7 @@ _LATEST: Final = {"dataport.buffer.length": "8"}
 
 
 class CollisionGuard:
-    """Adds components to a cart's motion chain that stop the cart before obstacles.
+    """Makes a cart stop before obstacles, by additional components in its motion chain.
 
     The new components find obstacles in the data of the range finder, and run in the execution
     context of the chain. PathFollower then sends its velocities to ObstaclesAvoidance.
