@@ -25,7 +25,7 @@ from tickrig.host.rtc.canopen.commands.server import component_option
 def main(
     file: Path, log: Path | None, components: Sequence[str], *, start: bool, **options: Any
 ) -> None:
-    """Serve a System Definition, and show and change it while it runs (extra tickrig[tui]).
+    """Run a CANopen system, and show and change it on the terminal (extra tickrig[tui]).
 
     FILE is the System Definition: YAML or JSON that describes the CANopen nodes of a system and
     their connections. The editor contains the server of rtc-canopen-server, and shows the running
