@@ -65,7 +65,7 @@ class CanopenPortType(Generic[T]):
         width: number of bits of an element, or 0 to use the number of bits of `data_type`.
 
     Raises:
-        ValueError: a sequence has no elements.
+        ValueError: `length` is less than 1.
     """
 
     name: str
@@ -167,7 +167,7 @@ _INTEGERS: Final = {8: DataType.INTEGER8, 16: DataType.INTEGER16, 32: DataType.I
 def integer(word_bits: int) -> CanopenPortType[int]:
     """Return the port type Integer of a device, whose size is the word size of its processor.
 
-    See Table 4, note 1.
+    See the NEDO report, 3.4.43.3, Table 4, note 1.
 
     Args:
         word_bits: word size in bits.
@@ -294,8 +294,8 @@ class PlacedPort:
     def mapping(self) -> tuple[int, ...]:
         """Entries of the mapping parameter of the port's PDO.
 
-        Each Boolean has one bit (Table 4). Dummy bits pad the last byte of an RPDO. A TPDO cannot
-        have dummy bits (CiA 301), so its last byte ends with unmapped zeros.
+        Each Boolean has one bit (NEDO report, Table 4). Dummy bits pad the last byte of an RPDO. A
+        TPDO cannot have dummy bits (CiA 301), so its last byte ends with unmapped zeros.
         """
         kind = self.profile.port_type
         mapped = [MappedObject(self.index, sub, kind.element_bits).encode() for sub in self.subs]

@@ -176,8 +176,8 @@ class UartReceiver:
 
         Args:
             level: level of the line, 1 or 0.
-            until_ps: end of the level. The end may be earlier than the end of an earlier call; the
-                call then has no effect.
+            until_ps: time at which the level ends, in ps. If earlier calls have received the line
+                up to this time already, this call has no effect.
 
         Yields:
             The characters that are completed by this level.

@@ -65,7 +65,9 @@ _COMMANDS: Final = (b"ID", b"ON", b"OFF")
 
 
 def parse_ucode(text: str) -> str:
-    """Return a ucode of 128 bits in its normal form, 32 hex digits in capitals.
+    """Return a ucode in its normal form, 32 hex digits in capitals.
+
+    A ucode is a number of 128 bits that identifies a place or a thing.
 
     Args:
         text: the ucode with hex digits in upper or lower case.

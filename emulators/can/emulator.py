@@ -91,7 +91,7 @@ class CanEmulator(RunningEmulator):
     def lost(self) -> dict[str, int]:
         """Number of frames that were lost because a queue was full.
 
-        The queue is at an end of the emulated bus, or at the port to a real bus.
+        Each node on the emulated bus has a queue. The port to a real bus has one, too.
         """
         ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
         return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}

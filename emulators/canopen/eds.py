@@ -229,7 +229,8 @@ def in_profile(
 ) -> DeviceDescription:
     """Apply a device profile to the description of a device from an EDS.
 
-    The profile supplies the application, and the defaults that are missing in the file.
+    The profile supplies the default values that are missing in the file. It also supplies the
+    application: what the device does besides communication.
 
     Args:
         description: description of the device by its file alone, from `EdsCache.read`.

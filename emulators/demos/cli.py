@@ -79,9 +79,11 @@ def tkernel(no_caches: bool) -> None:
 def fig120(plot: Path | None, **options: Any) -> None:
     """Let a potentiometer at one CANopen node turn the motor of another, without a PC in between.
 
-    A master links the analogue input of an f-palette with the reference of a
-    motor core unit (PDO linking), starts both and leaves the bus. It runs in
-    virtual time; with -i and -c in real time on a bus of python-can.
+    The node with the potentiometer is an f-palette, an I/O board. The node with the motor is a
+    motor core unit. A CANopen master links the analogue input of the f-palette with the reference
+    value of the motor core unit (PDO linking). Then the master starts both nodes, and leaves the
+    bus. The demonstration runs in virtual time. With -i and -c it runs in real time on a bus of
+    python-can.
 
     \b
     tickrig demo fig120

@@ -45,8 +45,8 @@ class CurveSample(NamedTuple):
     Attributes:
         time_s: seconds since the potentiometer was first turned.
         volts: voltage at the analogue input of the palette.
-        reference: latest reference value of the motor core unit, which is its object 6411h:01. The
-            unit receives the value with the PDO 290h.
+        reference: latest reference value of the motor core unit, its object 6411h:01. The unit
+            receives the value in the PDO with the COB-ID 290h.
         angle_deg: angle of the motor's shaft.
     """
 

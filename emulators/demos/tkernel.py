@@ -38,7 +38,7 @@ class Estimate:
     Attributes:
         range_m: range of the reader that receives the markers, in metres.
         x_m: estimated position in x, in metres.
-        y_m: estimated position in y, which is to the left of x, in metres.
+        y_m: estimated position in y, in metres. The y axis points to the left of the x axis.
         fixes: number of corrections of the estimate by a marker.
     """
 

@@ -89,8 +89,9 @@ def _split_numbers(text: str) -> tuple[str, list[float]]:
 def parse_number_rule(text: str) -> NumberRule:
     """Parse a number tolerance: `PATTERN=TOLERANCE` or `PATTERN[FROM:TO]=TOLERANCE`.
 
-    PATTERN selects lines or frames. FROM and TO are the first position and the end of the number in
-    them. Positions count the characters of a line, or the data bytes of a frame.
+    PATTERN selects lines or frames. In a selected line or frame the number begins at the position
+    FROM, and ends before the position TO. Positions count the characters of a line, or the data
+    bytes of a frame, from 0.
 
     A tolerance that ends in `%` is a percentage of the recorded number.
 
@@ -114,8 +115,9 @@ class Tolerance:
     """Allowed deviations of an emulated run from a recorded run.
 
     Attributes:
-        time_us: allowed deviation of a time at the start of the run, in microseconds. Later in the
-            run the method `allowed_us` adds the largest drift between two clocks.
+        time_us: largest allowed difference between a recorded time and an emulated time, in
+            microseconds. It applies at the start of the run. Later the method `allowed_us` allows
+            more, because clocks drift.
         numbers: tolerances of numbers in lines.
         ignored: patterns of lines that are not compared.
         kinds: patterns, each for one kind of lines. The order of lines is compared only within a

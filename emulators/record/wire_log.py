@@ -123,8 +123,9 @@ class WireLog:
         """Return the incomplete line or frame of each direction, as an entry with the number 0.
 
         Args:
-            by_gap: whether to return only the frames that a silence ends. Such a frame may already
-                be complete. With false all other lines and frames are returned.
+            by_gap: kind of the entries. True selects the frames that only a silence can end.
+                Such a frame may already be complete. False selects the lines, and the frames whose
+                end is known from their bytes.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

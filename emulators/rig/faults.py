@@ -574,9 +574,9 @@ class FaultyPort(Copyable, Generic[W]):
     def clear(self, name: str) -> None:
         """End an armed fault; do nothing if the fault is not armed.
 
-        If the fault has only delayed traffic, this traffic still arrives at its delayed time, and
-        before all later traffic. If the fault holds back traffic for another reason, this traffic
-        is lost.
+        If the fault delays traffic without loss, the delayed traffic still arrives at its delayed
+        time, and before all later traffic. If the fault holds back traffic for another reason, this
+        traffic is lost.
         """
         for faults in (self._to_device, self._from_device):
             fault = faults.get(name)

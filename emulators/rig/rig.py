@@ -137,7 +137,7 @@ class _Wires(Part):
 
     @property
     def only_bus(self) -> Any:
-        """The CAN bus for the compiled kernel, or None if the rig has other wires or no CAN bus."""
+        """The CAN bus of the rig, or None if the rig has other wires or no CAN bus."""
         return getattr(self._wires[0], "_kernel_bus", None) if len(self._wires) == 1 else None
 
     @property

@@ -222,9 +222,9 @@ class _Late(ByteFault, HoldingFault[bytes]):
         self._queue, self._free_us = other._queue, other._free_us
 
     def sent(self, until_us: int) -> None:
-        """Note when the line will have sent the latest bytes: the next pause begins then.
+        """Record the time at which the line will have sent the latest bytes.
 
-        The fault makes pauses between bytes.
+        If the fault makes a pause before the next bytes, the pause begins at this time.
 
         Args:
             until_us: time at which the last byte has been sent, in microseconds.

@@ -103,10 +103,10 @@ class FastScan(NamedTuple):
     """A request of LSS fastscan, with which a master searches for slaves without a node-ID.
 
     Attributes:
-        id_number: requested part of the LSS address.
+        id_number: number with which the slaves compare one part of their LSS address.
         bit_check: lowest compared bit, or 0x80 to restart the search.
-        sub: number of the part, from 0 (vendor-ID) to 3 (serial number).
-        next_sub: number of the part in the next request.
+        sub: number of the compared part, from 0 (vendor-ID) to 3 (serial number).
+        next_sub: number of the part that the next request compares.
     """
 
     id_number: int

@@ -68,7 +68,8 @@ def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
     """Yield each object of a PDO mapping, with the number of bits that precede it in the PDO.
 
     Args:
-        mapping: entries of the mapping parameter, such as 6040 0010h.
+        mapping: entries of the mapping parameter. For example, 6040 0010h is the object 6040h:00
+            with 16 bits.
     """
     shift = 0
     for value in mapping:

@@ -102,13 +102,13 @@ PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
 def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
     """Return the number of lines per second that a host may send to an RRC wheelchair controller.
 
-    The number applies while the wheelchair (VR2) runs. If the RRC receives more lines than it can
-    process, it stops the wheelchair.
+    The RRC controls the wheelchair VR2. The number applies while VR2 runs. If the RRC receives more
+    lines than it can process, it stops VR2.
 
     Args:
         stable: whether OK lines are omitted (stablemode).
-        status: whether a status line is sent in each period.
-        extra_pct: other work of the RRC, in per cent of a period.
+        status: whether the RRC sends a status line in each of its periods of 10 ms.
+        extra_pct: share of these periods that the RRC needs for other work, in per cent.
 
     >>> pace_lines_s(stable=True, status=True), pace_lines_s(stable=False, status=True)
     (160, 100)

@@ -139,11 +139,11 @@ class StatusA:
         It ends with the checksum digit CHECK and LF.
 
         Args:
-            stick_pct: translation and rotation of the stick, #1 and #2.
-            out_pct: translation and rotation for the motors, #3 and #4.
-            gauge: level of the battery gauge, #5.
-            speed_mode: speed mode, #6.
-            counts: counters of the buttons, #7, #8 and #9.
+            stick_pct: fields #1 and #2 of the line, translation and rotation of the stick.
+            out_pct: fields #3 and #4, translation and rotation for the motors.
+            gauge: field #5, level of the battery gauge.
+            speed_mode: field #6, speed mode.
+            counts: fields #7, #8 and #9, counters of the buttons.
 
         >>> StatusA.line((100, 0), (50, 0), 10, 1, (0, 0, 0))
         b'SA:64003200A1000F\n'

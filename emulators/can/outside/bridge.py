@@ -15,14 +15,14 @@ _HANDOVER_US: Final = 1_000
 
 
 class CanBridge:
-    """Connects one end of an emulated bus with a real bus that python-can opens.
+    """Connects an emulated bus with a real bus that python-can opens.
 
     The nodes of the rig communicate on their own emulated wire. Each of their frames is sent once
     to the real bus. Frames from the real bus are sent on the emulated wire as if an additional node
     sent them. So each of these frames also occupies the emulated wire for the length of the frame.
 
     Args:
-        end: an end of the wire without a station.
+        end: connection to the emulated bus, made by `CanWire.end`. No node uses this connection.
         outside: port of the bus outside.
     """
 

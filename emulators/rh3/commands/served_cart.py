@@ -108,8 +108,8 @@ class CartControl(SystemControl):
     Goals and paths are commands of the component PositionInput.
 
     Args:
-        connection: connection to the base, with the RT components. While a request is answered, the
-            time of the connection must not advance.
+        connection: connection to the base, with the RT components. Its time, `now_us`, must not
+            advance while a request is answered.
         cart: the running cart.
     """
 

@@ -73,7 +73,7 @@ def campaign() -> None:
 @click.option("--fresh", is_flag=True, help="Start again, and replace earlier results.")
 @works_in("tickrig.emulators.testing.commands.campaign_run:run")
 def run(**options: Any) -> None:
-    """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
+    """Run TESTS (files, folders, node IDs) with each seed and each --param value, in virtual time.
 
     The exit status is 1 if a run did not pass, and 3 if the disk is full.
 

@@ -263,7 +263,9 @@ class _CampaignRun:
             )
 
     def run(self) -> CampaignTable:
-        """Execute the remaining runs of the campaign, write the tables, and return the table.
+        """Execute the remaining runs of the campaign, and return the table of the results.
+
+        This method also writes the table to the output files.
 
         Raises:
             CampaignRefusal: the campaign cannot run or continue. The results of finished runs are

@@ -24,7 +24,9 @@ _Entry = tuple[int, int, _Call]
 
 
 class DurandSlave:
-    """A `durand.Node` as a slave for the conformance tester, with virtual network and time.
+    """A node of the CANopen library durand, as a slave for the conformance tester.
+
+    The network and the time of the node are virtual.
 
     durand has one scheduler for the whole process. While the node is called, the scheduler of this
     object takes its place. Afterwards durand's own scheduler is restored.

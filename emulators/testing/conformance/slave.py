@@ -119,10 +119,9 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Return whether an object can be called only with arguments: a time and frames.
+    """Return whether an object can be called with a time and frames, but not without arguments.
 
-    Such an object is the function of a slave for each millisecond. `CalledSlave` refuses it,
-    because its argument `make` is called without arguments.
+    `CalledSlave` refuses such an object as `make`, because `make` is called without arguments.
     """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 

@@ -97,9 +97,12 @@ def place_of(file: str, line: int) -> str:
 
 
 def host_places(frame: FrameType | None) -> list[str]:
-    """Return the lines of host code in the call stack of a frame, from innermost to outermost.
+    """Return the lines of host code in a Python call stack, from innermost to outermost.
 
     The last line in the result is a line of the test.
+
+    Args:
+        frame: innermost frame of the call stack.
     """
     places: list[str] = []
     while frame is not None:

@@ -348,9 +348,9 @@ def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
 
     A campaign runs a test several times. In virtual time the bench may be kept after the warm-up of
     the first run. Then a later run gets a copy of the kept bench without a warm-up. A bench is not
-    kept if its warm-up drew random numbers. The copy is not used if `bench` differs from the kept
-    bench before its warm-up in more than the seed. Hosts, triggers and tasks of the warm-up are
-    removed.
+    kept if its warm-up drew random numbers. The copy is used only if, before the warm-up, `bench`
+    and the bench of the first run were equal; their seeds may differ. Hosts, triggers and tasks of
+    the warm-up are removed.
 
     Raises:
         ValueError: the bench cannot be copied after the warm-up, although it could be copied

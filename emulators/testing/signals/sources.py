@@ -206,7 +206,7 @@ class ValueTable(Immutable):
             value.
         values: the value at each time.
         linear: whether to interpolate linearly. If not, each value holds until the next time.
-        repeat: whether the table is repeated. If true, the last time of the table is again time 0.
+        repeat: whether the table starts again from time 0 when its last time is reached.
     """
 
     times_us: tuple[int, ...]

@@ -64,7 +64,8 @@ def read_points(path: Path, column: str | None) -> _Points:
         path: path of a CSV file, a trace, or a CAN log. The suffix selects the format.
         column: name of a column of a CSV file, name of an input of a trace, or bits of a frame in a
             CAN log. For example, `181[2:6]s*0.001` means bytes 2 to 5 of frame 181h, signed, times
-            0.001. None selects the only column besides the times of a CSV file.
+            0.001. None is possible only for a CSV file with two columns: the first column has the
+            times, and None selects the second one.
 
     Raises:
         ValueError: the file cannot be read, has no such column, or has no value in this column.

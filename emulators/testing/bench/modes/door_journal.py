@@ -112,7 +112,7 @@ class DoorJournal(Journal):
         """Return a monitor that adds the traffic of a host's connection to the journal.
 
         Args:
-            mount: the wire, on an emulated bench with the same devices.
+            mount: name and settings of the wire to which the host is connected.
             pace: monitor that measures how late the host is.
         """
         if isinstance(mount, LineMount):

@@ -30,7 +30,7 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Measures how much too late the waits of a host at a connection end.
+    """Measures how much longer a host has waited at a connection than it requested.
 
     The connection calls the methods when the host waits, sends or receives. A subclass can override
     `passed` to get the traffic of the connection.
@@ -288,8 +288,8 @@ class CpuWaits:
     def look(self, now_us: int) -> None:
         """Update `worst_us` with the waits of all threads, unless the last update is recent.
 
-        If the last update is too long ago, the waits since then are ignored, because they would be
-        added up over much more than `_LOOK_US`.
+        If the last update is longer ago than `_LONG_US`, the waits since then are ignored. Many
+        short waits would otherwise look like one long wait.
 
         Args:
             now_us: present time in microseconds.

@@ -578,7 +578,9 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return a function that gets the present time of the bench, and starts a fault.
+        """Return a function that starts a fault.
+
+        The argument of the returned function is the present time of the bench, in microseconds.
 
         Args:
             owner: name of the device or wire with the fault, or empty if the fault may belong to

@@ -134,7 +134,7 @@ class _WaitLimit(HostLimit):
     ) -> None:
         """Count a read of the clock by a host, or a wait that took no time.
 
-        A host that repeats only these hangs, because they do not advance the time.
+        Such reads and waits do not advance the time. So a host that does nothing else never ends.
 
         Raises:
             HostHangsError: there were too many such reads and waits.
