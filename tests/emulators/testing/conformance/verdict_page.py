@@ -97,9 +97,10 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     found = compare(report, read_table(stack))
     yield f"## {name}\n"
     yield (
-        f"Another tester has verdicts for {len(read_table(stack)) - 1} of the checks."
-        f" Both testers give a verdict for {found.both} checks,"
-        f" and in {found.same} of these checks the two verdicts are the same."
+        f"The file `tests/golden/canopen/foreign_verdicts.txt` has the results of another tester,"
+        f" with {len(read_table(stack)) - 1} checks. For {found.both} of these checks, our tester"
+        f" has a verdict, too. In {found.same} of these {found.both} checks the two verdicts are"
+        " the same."
     )
     if found.differences:
         yield "\nThe two testers differ in these checks:\n"

@@ -18,8 +18,9 @@ WORDS: Final = {
 """What the public checks call a verdict; where the device decides they said FAIL, and (impl)."""
 
 REASONS: Final[Mapping[tuple[str, str], str]] = {
-    ("LocalNode", "SG-01"): "an abort names the object of a request, so LocalNode cannot"
-    " abort before its first request. Our tester had requested other objects before",
+    ("LocalNode", "SG-01"): "an abort contains the index of an object. LocalNode takes this index"
+    " from an earlier request, so without an earlier request it cannot abort. Before this check,"
+    " our tester had already sent requests to LocalNode, and the other tester had not",
     ("LocalNode", "DS-08"): "LocalNode refuses a download in segments only after the last segment."
     " CiA 301 allows this",
 }
