@@ -126,6 +126,8 @@ class EmulatorControl(RequestDispatcher):
             if not isinstance(name, str) or not (
                 name in device.inputs.table or name in device.outputs
             ):
+                if members := device.inputs.groups.get(str(name)):
+                    raise ValueError(f"{name} can only be set; read {', '.join(members)}")
                 hint = near(str(name), [*device.inputs.table, *device.outputs])
                 raise ValueError(f"no input or output {short(name)}; {hint}")
         return {"values": {name: read_signal(device, name) for name in names}}

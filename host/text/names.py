@@ -32,10 +32,10 @@ def near(name: str, names: Iterable[str]) -> str:
 
     >>> near("stik", ["stick", "lamp"]), near("x", ["stick", "lamp"])
     ("did you mean 'stick'?", 'known: stick, lamp')
-    >>> near("left/x", ["left/stick", "right/lamp"])
+    >>> near("left/x", ["left/stick", "right/lamp", "left/stick"])
     'known: left/stick'
     """
-    names, device = list(names), "".join(name.rpartition("/")[:2])
+    names, device = list(dict.fromkeys(names)), "".join(name.rpartition("/")[:2])
     if close := closest(name, names):
         return f"did you mean {close[0]!r}?"
     own = [each for each in names if device and each.startswith(device)]

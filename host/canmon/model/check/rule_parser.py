@@ -243,15 +243,19 @@ class ExpressionRule:
         """
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
-            texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
+            away = {} if self._forced or not self._scopes else dict(self._slices)
+            missing = [path for path in self._missing.paths if path not in away]
+            texts = [f"no signal {path} came{self._near(path)}" for path in missing]
             texts += [f"no frame with {word} came" for word in self._missing.words]
         hint = "" if self._demand.came or not self._unmapped else _NO_MAPPING
         return [TrafficFinding(end_us, self.name, text + hint) for text in texts]
 
     def unjudged(self, evidence: CheckedTraffic) -> str:
         """Return why the rule has judged nothing, empty if it has judged something."""
-        if not self._forced:
+        if not self._forced and self._scopes:
             return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"
+        if not self._forced:
+            return "no frame came"
         if self._demand.timed and evidence.untimed:
             return ONE_TIME
         if self._demand.judged:
@@ -283,6 +287,10 @@ class ExpressionRule:
 
     def _near(self, path: str) -> str:
         _, name, _ = filters.signal_place(path)
+        if path in dict(self._slices) and not self._scopes:
+            return (
+                f"; if this frame may be missing, end the rule with: after {path.partition('[')[0]}"
+            )
         near = closest(name, [*filters.KINDS, *sorted(self._names)])
         return f"; did you mean {near[0]}?" if near and near[0] != name else ""
 
@@ -775,7 +783,8 @@ class Expression:
 def _made(name: str, text: str) -> ExpressionRule:
     parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
-    mapped = "pdo" in text or any("." in path for path in paths)
+    cuts = dict(slices)
+    mapped = "pdo" in text or any("." in path for path in paths if path not in cuts)
     unsure = [path for path in paths if not demands.AtFrames.is_event_signal(path)]
     missing = filters.MissingSignals(unsure, parser.words)
     return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)

@@ -167,6 +167,7 @@ def test_a_group_is_set_at_once() -> None:
         (lambda bench: bench.set("stik", 1), "no input 'stik'; did you mean 'stick'?"),
         (lambda bench: bench.set("state", 1), "state is an output: it can be read, not set"),
         (lambda bench: bench.get("nothing"), "no input or output .*nothing.*; known: .*state"),
+        (lambda bench: bench.get("stick"), "stick can only be set; read stick_v_pct, stick_w_pct"),
         (lambda bench: bench.press("state"), "no button 'state'; known: .*power_button"),
         (lambda bench: bench.fault("smoke"), "no fault 'smoke'; known: .*cut"),
         (lambda bench: bench.run_for("soon"), "'soon' is not a time"),

@@ -3,6 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.model.check.expression.held import MAPPED, broken, findings
+from tickrig.host.canmon.model.check.rule import CheckedTraffic
+from tickrig.host.canmon.model.check.rule_parser import parse_rule
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import FdFrame
 
@@ -131,7 +133,22 @@ def test_bits_of_frames_that_nobody_mapped_are_values(rule: str, said: str) -> N
 
 def test_a_slice_of_29_bits_is_another_one() -> None:
     assert len(broken("18FF0001[0] in 0..1", "1 18FF0001#02\n2 181#02")) == 1
-    assert broken("00000181[0] never", "1 181#02") == ["1 no signal 00000181[0] came"]
+    hint = "if this frame may be missing, end the rule with: after 00000181"
+    assert broken("00000181[0] never", "1 181#02") == [f"1 no signal 00000181[0] came; {hint}"]
+
+
+def test_a_frame_whose_bits_a_rule_judges_may_be_missing() -> None:
+    rule = "182[0.3] never after 182"
+    assert broken(rule, "1 181#02") == []
+    assert broken(rule, "1 182#00\n2 182#08") == [
+        "2 unmapped of node 2: mapping unknown 182[0.3]=1"
+    ]
+    assert len(broken("182[0.3] never while statsword.fault", "1 181#02")) == 1
+
+
+def test_a_log_without_frames_is_the_reason_why_a_rule_judges_nothing() -> None:
+    (rule,) = parse_rule("emcy never").make()
+    assert rule.unjudged(CheckedTraffic({}, 0, "")) == "no frame came"
 
 
 HINT = "; PDOs without a known mapping came: describe them by --eds"
