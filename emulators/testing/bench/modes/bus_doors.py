@@ -140,4 +140,5 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
     """
     bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)
-    return CanBridge(end, port_on(bus, plan.interface, _name_of(plan), LinkGone))
+    name = _name_of(plan)
+    return CanBridge(end, port_on(bus, plan.interface, name, LinkGone), name)
