@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -21,11 +22,16 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.errors import FramingError
 
 if TYPE_CHECKING:
+    from tickrig.emulators.canopen.node import Node
     from tickrig.host.canmon.model import frames
-    from tickrig.host.canmon.model.decode import decoder
+    from tickrig.host.canmon.model.decode import decoder, node_memory
+    from tickrig.wire.canopen.eds import eds_device, object_table
 else:  # a failure needs them, not each test
     decoder = LazyModule("tickrig.host.canmon.model.decode.decoder")
+    eds_device = LazyModule("tickrig.wire.canopen.eds.eds_device")
     frames = LazyModule("tickrig.host.canmon.model.frames")
+    node_memory = LazyModule("tickrig.host.canmon.model.decode.node_memory")
+    object_table = LazyModule("tickrig.wire.canopen.eds.object_table")
 
 
 # Names of signals of a bench, without the objects of dictionaries: these are many; of faults.
@@ -59,19 +65,40 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
     """Return the names of the CAN buses of a bench."""
     mode = bench._mode
     try:
-        mounts = mode.act(lambda rig: rig.state.mounts)
+        return tuple(mode.act(_buses))
     except NotOnThisBench:
         return tuple(wire for wire in mode.wires if isinstance(mode.doors.address(wire), dict))
-    return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
+
+
+def _buses(rig: BenchRig) -> dict[str, BusMount]:
+    mounts = rig.state.mounts.items()
+    return {name: mount for name, mount in mounts if isinstance(mount, BusMount)}
+
+
+def _objects(bench: Bench) -> dict[int, node_memory.EdsObjects]:
+    """Return the objects of the emulated nodes by node-ID, if each node-ID is there once."""
+    try:
+        buses = bench._mode.act(_buses)
+    except NotOnThisBench:
+        return {}
+    nodes = [node for bus in buses.values() for node in bus.nodes.values()]
+    ids = Counter(node.slave.node_id for node in nodes)
+    return {node.slave.node_id: _objects_of(node) for node in nodes if ids[node.slave.node_id] == 1}
+
+
+def _objects_of(node: Node) -> node_memory.EdsObjects:
+    known = node.slave.dictionary.description
+    device = eds_device.EdsDevice(object_table.DeviceInfo(), known.entries, known.objects)
+    return node_memory.eds_objects(device, node.slave.node_id, node.name)
 
 
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
     """Yield each line of a bench's journal with its text; the text of a CAN frame is decoded.
 
-    PDOs are decoded by the mapping that the host wrote, even if the journal no longer has the lines
-    with the mapping.
+    PDOs are decoded with the mapping of the emulated node after power-on, or with the mapping that
+    the host wrote, even if the journal no longer has these lines.
     """
-    meanings, buses = decoder.Decoder(), buses_of(bench)
+    meanings, buses = decoder.Decoder(_objects(bench)), buses_of(bench)
     for line in bench._mode.mappings():
         _meaning(meanings, line)
     for line in bench._mode.journal():

@@ -9,7 +9,7 @@ import canopen
 import pytest
 
 from tests.host.canopen.master.joints import cell
-from tickrig import Bench
+from tickrig import Bench, open_bench
 from tickrig.emulators.testing.bench import bench_rig as journal
 from tickrig.emulators.testing.plugin.journal_text import last_lines
 
@@ -25,6 +25,36 @@ def test_what_pdos_carry_is_known_after_their_mapping_is_dropped(
     assert pdos
     assert "mapping unknown" not in text
     assert all("Statusword" in line or "statusword" in line for line in pdos), pdos[0]
+
+
+def test_frames_of_a_node_are_decoded_by_its_own_objects() -> None:
+    with Bench(left="1=epos", right="2=epos", io="3=f-palette") as bench:
+        network = bench.canopen_network()
+        network.add_node(1, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]
+        bench.run_for("10ms")
+        network[1].nmt.state = "OPERATIONAL"
+        bench.run_for("10ms")
+        network[1].sdo.download(0x6040, 0, b"\x06\0")
+        text = last_lines(bench, 60)
+    assert "statusword=0x0350[switch on disabled] position_actual_value=0" in text
+    assert "download 6040h:00 controlword = 0x0006" in text
+
+
+def test_nodes_with_one_node_id_on_two_buses_are_decoded_by_the_standard_alone(
+    tmp_path: Path,
+) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        '[wire.a]\ntype = "can"\n[wire.b]\ntype = "can"\n'
+        '[device.x]\ntype = "epos"\nnode_id = 1\nwire = "a"\n'
+        '[device.y]\ntype = "f-palette"\nnode_id = 1\nwire = "b"\n',
+        "utf-8",
+    )
+    with open_bench(rig) as bench:
+        bench.run_for("10ms")
+        text = last_lines(bench, 60)
+    assert "a < 701#00  boot-up" in text
+    assert "b < 701#00  boot-up" in text
 
 
 @pytest.mark.parametrize("fault", ["drop", "unplugged", "corrupt", "sdo_mute"])
