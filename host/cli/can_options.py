@@ -143,7 +143,11 @@ bus_options: Final[Decorator] = add_options(
     ),
     click.option("-c", "--channel", metavar="CHANNEL", help="Channel, such as can0."),
     click.option(
-        "-b", "--bitrate", type=_BitRate(), metavar="BITRATE", help="Bit rate in bit/s, or as 500k."
+        "-b",
+        "--bitrate",
+        type=_BitRate(),
+        metavar="BITRATE",
+        help="Bit rate in bit/s, such as 500000 or 500k.",
     ),
     click.option(
         "--timing",
@@ -170,7 +174,8 @@ fd_options: Final[Decorator] = add_options(
         "--data-bitrate",
         type=_BitRate(),
         metavar="BITRATE",
-        help="Data bit rate of CAN FD frames with BRS; for the load, and with --fd for the driver.",
+        help="Data bit rate of CAN FD frames with BRS, such as 2M, for the load and (with --fd)"
+        " the driver.",
     ),
 )
 """Decorator that adds the CAN FD fields of `BusOptions`, in addition to `bus_options`."""

@@ -121,22 +121,30 @@ openrtm_options: Final[Decorator] = add_options(
     click.option(
         "--openrtm",
         metavar="HOST[:PORT]",
-        help="Offer components as OpenRTM components in this name server (extra tickrig[openrtm]).",
+        help="Register the components as OpenRTM components at this name server (extra"
+        " tickrig[openrtm]).",
     ),
     click.option(
         "--openrtm-address",
         metavar="HOST[:PORT]",
-        help="Address for peers, by default 127.0.0.1. CORBA has no access control.",
+        help="Listen for peers at this address. [127.0.0.1] CORBA has no access control.",
     ),
     click.option(
-        "--openrtm-names", metavar="FORMAT", help="As naming.formats. [%h.host_cxt/%n.rtc]"
+        "--openrtm-names",
+        metavar="FORMAT",
+        help="Format of names, as in naming.formats. [%h.host_cxt/%n.rtc]",
     ),
 )
 
 ros2_options: Final[Decorator] = add_options(
-    click.option("--ros2", is_flag=True, help="Ports as ROS 2 topics (extra tickrig[ros2])."),
     click.option(
-        "--ros2-table", type=PATH, metavar="FILE", help="TOML: which ports, topics and types."
+        "--ros2", is_flag=True, help="Connect ports to ROS 2 topics (extra tickrig[ros2])."
+    ),
+    click.option(
+        "--ros2-table",
+        type=PATH,
+        metavar="FILE",
+        help="Read ports, topics and types from a TOML file.",
     ),
     click.option(
         "--ros2-domain",
@@ -145,7 +153,9 @@ ros2_options: Final[Decorator] = add_options(
         help="DDS domain; by default ROS_DOMAIN_ID, else 0.",
     ),
     click.option(
-        "--ros2-interface", metavar="NAME", help="[loopback] DDS has no access control here."
+        "--ros2-interface",
+        metavar="NAME",
+        help="Network interface. [loopback] DDS has no access control here.",
     ),
 )
 
