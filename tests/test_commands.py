@@ -331,7 +331,7 @@ def test_every_example_is_a_line_that_its_command_takes(line: str) -> None:
 
 
 OPTION_NAMES = {
-    "--json": r"flag: (?!.*(one a line|object a)).*JSON",
+    "--json": r"flag: (?!.*(one (a|per) line|object (a|per))).*JSON",
     "--jsonl": r"flag: .*(JSON, one a line|JSON object a)|flag: .*JSON.*\b(each|per)\b",
     "-o": r"(?i)(path|\S*file\S*|dir|out): (.*\b(write|record)\b|the (page|rules|trace)\b|"
     r"of --plot|output|file for|into a log|junit|svg|markdown|one page|\.svg)",

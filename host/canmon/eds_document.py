@@ -123,7 +123,8 @@ eds_folder_option: Final = click.option(
     multiple=True,
     type=PATH,
     metavar="DIR",
-    help="A folder of EDS files: the one whose vendor, product and revision the node has (1018h).",
+    help="Search DIR for the EDS file that matches vendor, product and revision of the node"
+    " (1018h).",
 )
 
 

@@ -50,7 +50,9 @@ class _Case(NamedTuple):
 @click.command()
 @click.argument("file", nargs=-1, required=True, type=PATH)
 @click.option("--strict", is_flag=True, help="Count warnings as errors.")
-@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Findings as JSON, one a line.")
+@click.option(
+    "--jsonl", "--json", "as_json", is_flag=True, help="Print findings as JSON, one per line."
+)
 @click.option("--junit", "report", type=PATH, metavar="FILE", help="Write a JUnit report.")
 def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | None) -> None:
     """Check EDS files and print all findings. The exit status is 1 if there is an error.
@@ -147,7 +149,7 @@ _LEFT: Final = 1
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("-o", "--output", type=PATH, metavar="OUT", help="Output file; may be FILE.")
+@click.option("-o", "--output", type=PATH, metavar="OUT", help="Write to OUT, which may be FILE.")
 @click.option("--dry-run", is_flag=True, help="Show the changes; write nothing.")
 @click.option(
     "--encoding",
@@ -318,7 +320,9 @@ _DIFFERENT: Final = 1
 @click.command()
 @click.argument("old", type=PATH)
 @click.argument("new", type=PATH)
-@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Differences as JSON, one a line.")
+@click.option(
+    "--jsonl", "--json", "as_json", is_flag=True, help="Print differences as JSON, one per line."
+)
 def compare(old: Path, new: Path, as_json: bool) -> None:
     """Compare the devices of two EDS files. The exit status is 1 if they differ.
 

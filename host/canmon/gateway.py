@@ -34,8 +34,12 @@ _ERROR: Final = "] ERROR:"
 
 @click.command()
 @click.argument("source", required=False)
-@click.option("--listen", metavar="[HOST:]PORT", help="Serve TCP; HOST is 127.0.0.1 unless given.")
-@click.option("--socket", "path", type=PATH, help="Serve a Unix socket, for this user alone.")
+@click.option(
+    "--listen", metavar="[HOST:]PORT", help="Serve a TCP port. The default HOST is 127.0.0.1."
+)
+@click.option(
+    "--socket", "path", type=PATH, help="Serve a Unix socket that only this user can open."
+)
 @click.option("--net", type=click.IntRange(1, _MOST_NET), default=1, help="Number of the net.  [1]")
 @bus_options
 def command(

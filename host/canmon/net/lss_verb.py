@@ -237,16 +237,26 @@ _KBIT: Final = {"k": 1_000, "M": 1_000_000}
 
 
 @click.command()
-@click.option("--identity", metavar="V:P:R:S", help="Vendor, product, revision, serial, in hex.")
-@click.option("--fastscan", is_flag=True, help="The nodes without a node-ID, one by one.")
-@click.option("--only-node", is_flag=True, help="The only node on the bus, of any identity.")
-@click.option("--node-id", "ids", metavar="N|N-M", help="1..127; a range for several.")
-@click.option("--bit-rate", metavar="RATE", help="As 500k; used when activated or at power-on.")
-@click.option("--store", is_flag=True, help="Store both in the node.")
+@click.option(
+    "--identity",
+    metavar="V:P:R:S",
+    help="Select by vendor, product, revision and serial (hex).",
+)
+@click.option("--fastscan", is_flag=True, help="Select the nodes without a node-ID, one by one.")
+@click.option("--only-node", is_flag=True, help="Select the only node on the bus, of any identity.")
+@click.option(
+    "--node-id", "ids", metavar="N|N-M", help="New node-ID, 1 to 127, or a range for several nodes."
+)
+@click.option(
+    "--bit-rate",
+    metavar="RATE",
+    help="New bit rate, such as 500k, used after --activate or power-on.",
+)
+@click.option("--store", is_flag=True, help="Store node-ID and bit rate in the node.")
 @time_option("--activate", "activate_us", help="Switch the bit rate after a delay, such as 200ms.")
 @time_option("--wait", "wait_us", help="Time-out of each request of a fastscan. [20ms]")
 @click.option("--dry-run", is_flag=True, help="Find nodes without configuring them.")
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def command(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,

@@ -63,13 +63,15 @@ _WAIT_US: Final = 500_000
 
 
 @click.command()
-@time_option("--wait", "wait_us", help="Wait for the last answers and heartbeats. [500ms]")
+@time_option("--wait", "wait_us", help="Wait TIME for the last answers and heartbeats. [500ms]")
 @click.option("--json", "as_json", is_flag=True, help="Print nodes as JSON, one per line.")
-@click.option("--write", "bus_file", type=PATH, metavar="FILE", help="Write a bus.yml of them.")
+@click.option(
+    "--write", "bus_file", type=PATH, metavar="FILE", help="Write the nodes to a bus.yml."
+)
 @click.option("--workspace", type=PATH, metavar="FILE", help="Write a workspace for canmon tui.")
 @click.option("--rules", type=PATH, metavar="FILE", help="Write rules for canmon check.")
 @eds_folder_option
-@click.option("--force", is_flag=True, help="Replace files that exist.")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 @click.pass_obj
 def scan(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
@@ -325,7 +327,7 @@ _PERIODS: Final = 3
 @click.argument("word", type=Choice(list(NMT_WORDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def nmt(call: NetCall, word: str, node: str, dry_run: bool, yes: bool) -> None:
     """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
@@ -506,19 +508,23 @@ _HALF: Final = "the node is as the steps before left it"
 
 @click.command()
 @click.argument("node", type=NODE_ID)
-@click.option("--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that has the node.")
+@click.option(
+    "--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that describes the node."
+)
 @node_eds_option("EDS or DCF of the node.")
 @click.option(
     "--explain",
     "--dry-run",
     "explain",
     is_flag=True,
-    help="Read only: show each step, and what would be written.",
+    help="Only read: show each step and what would be written.",
 )
-@click.option("--steps", is_flag=True, help="Boot it, and show each step.")
-@click.option("--keep-alive", "leaves_alone", is_flag=True, help="Leave it if it is Operational.")
-@click.option("--start", is_flag=True, help="Start it when it has booted.")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--steps", is_flag=True, help="Boot the node and show each step.")
+@click.option(
+    "--keep-alive", "leaves_alone", is_flag=True, help="Do nothing to a node that is Operational."
+)
+@click.option("--start", is_flag=True, help="Start the node after the boot-up.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def boot(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,

@@ -49,7 +49,7 @@ _REFUSED: Final = 1
 @click.argument("node", type=NODE_ID)
 @click.argument("names", nargs=-1, metavar="OBJECT...")
 @node_eds_option()
-@click.option("--json", "as_json", is_flag=True, help="Objects as JSON, one a line.")
+@click.option("--json", "as_json", is_flag=True, help="Print objects as JSON, one per line.")
 @click.pass_obj
 def read(
     call: NetCall, node: int, names: Sequence[str], eds: Path | EdsFolder | None, as_json: bool
@@ -115,7 +115,7 @@ _PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 @click.argument("values", nargs=-1, required=True, metavar="OBJECT=VALUE...")
 @node_eds_option()
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def write(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
@@ -356,7 +356,7 @@ def _sub(word: str) -> int:
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def store(call: NetCall, node: int, area: str, dry_run: bool, yes: bool) -> None:
     """Store parameters of NODE (1010h): all, communication, application or a sub-index.
@@ -381,9 +381,14 @@ def store(call: NetCall, node: int, area: str, dry_run: bool, yes: bool) -> None
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
-@click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they apply at once.")
+@click.option(
+    "--reset",
+    "then_reset",
+    is_flag=True,
+    help="Reset the node, so that the defaults apply at once.",
+)
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def restore(  # noqa: PLR0913, PLR0917 - options
     call: NetCall, node: int, area: str, then_reset: bool, dry_run: bool, yes: bool
@@ -425,11 +430,13 @@ def restore(  # noqa: PLR0913, PLR0917 - options
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH)
 @click.option("--all", "whole", is_flag=True, help="Also write unchanged values.")
-@click.option("--skip", multiple=True, metavar="OBJECT", help="Object to omit; may be repeated.")
-@click.option("--store", is_flag=True, help="Then store all parameters (1010h:01).")
+@click.option(
+    "--skip", multiple=True, metavar="OBJECT", help="Do not write OBJECT; may be repeated."
+)
+@click.option("--store", is_flag=True, help="Store all parameters afterwards (1010h:01).")
 @click.option("--other-device", is_flag=True, help="Accept a FILE of another device.")
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def dcf(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,

@@ -95,15 +95,31 @@ _HALF: Final = (
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH, required=False)
-@click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
+@click.option(
+    "--number",
+    type=click.IntRange(1, 254),
+    default=1,
+    metavar="N",
+    help="Number of the program.  [1]",
+)
 @click.option(
     "--control", type=Choice(list(COMMANDS)), help="Send only this command to the program."
 )
-@click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; skip if the node has it.")
+@click.option(
+    "--expect",
+    metavar="ID",
+    help="Identification (1F56h) of FILE, in hex; skip if the node runs FILE.",
+)
 @click.option("--no-start", is_flag=True, help="Leave the program stopped.")
-@click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")
+@click.option(
+    "--tries",
+    type=click.IntRange(1, 99),
+    default=3,
+    metavar="N",
+    help="Maximum number of transfers.  [3]",
+)
 @dry_run_option
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation.")
 @click.pass_obj
 def command(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,

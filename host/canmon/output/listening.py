@@ -314,7 +314,7 @@ _PATIENCE_US: Final = 5_000_000
 
 
 span_option: Final = time_option(
-    "--for", "span_us", help="End after 10s, 500ms; in a log by its times."
+    "--for", "span_us", help="End after TIME, such as 10s. For a log, its timestamps count."
 )
 """Decorator that adds the option `--for`, in microseconds."""
 

@@ -197,22 +197,26 @@ recording_options: Final[Decorator] = add_options(
         "--rotate",
         multiple=True,
         metavar="SIZE|TIME",
-        help="With -l: begin a new file after 100M, 10min or 1h; FILE gets a number.",
+        help="With -l: begin a new file after SIZE or TIME, such as 100M or 10min. Files are"
+        " numbered.",
     ),
-    click.option("--disk", metavar="SIZE", help="With -l: all its files together, as 2G."),
+    click.option(
+        "--disk", metavar="SIZE", help="With -l: limit all files together to SIZE, such as 2G."
+    ),
     click.option(
         "--at-limit",
         type=Choice([limit.value for limit in AtLimit]),
-        help="What happens there: the oldest file goes (default), or the recording ends.",
+        help="At the limit of --disk, delete the oldest file (default), or end the recording.",
     ),
     click.option(
         "--trigger",
         multiple=True,
         metavar="WHEN",
-        help="With -l: record around this alone: a filter as -F, or rules.toml of check.",
+        help="With -l: record only around a trigger. WHEN is a filter as for -F, or a .toml rule"
+        " file of check.",
     ),
-    click.option("--pre", metavar="N|TIME", help="Frames, or time, before a trigger.  [5s]"),
-    click.option("--post", metavar="N|TIME", help="And behind it.  [5s]"),
+    click.option("--pre", metavar="N|TIME", help="Record N frames or TIME before a trigger.  [5s]"),
+    click.option("--post", metavar="N|TIME", help="Record N frames or TIME after a trigger.  [5s]"),
 )
 """Decorator that adds the options of `RecordingOptions`."""
 

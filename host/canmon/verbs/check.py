@@ -194,16 +194,20 @@ def _frame(record: Record) -> dict[str, str]:
 
 
 _TEXTS: Final = {
-    "no_emcy": "No EMCY except error reset.",
-    "no_sdo_abort": "No aborted SDO transfer.",
-    "no_error_frames": "No error frame.",
-    "no_reboot": "No node boots again without an NMT reset.",
-    "no_lost_heartbeat": "No node that sent heartbeats stops, or misses one; periods are learnt.",
-    "no_loss": "No frame lost, no invalid line in a log.",
+    "no_emcy": "Report each EMCY except error reset.",
+    "no_sdo_abort": "Report each aborted SDO transfer.",
+    "no_error_frames": "Report each error frame.",
+    "no_reboot": "Report a node that boots again without an NMT reset.",
+    "no_lost_heartbeat": (
+        "Report a node that stops sending heartbeats, or misses one; periods are learnt."
+    ),
+    "no_loss": "Report lost frames, and invalid lines of a log.",
 }
 
 _rule_options: Final[Decorator] = add_options(
-    click.option("--max-load", type=float, metavar="PERCENT", help="Of any second; needs -b."),
+    click.option(
+        "--max-load", type=float, metavar="PERCENT", help="Limit the load of each second; needs -b."
+    ),
     *(
         click.option(f"--{name.replace('_', '-')}", name, is_flag=True, help=text)
         for name, text in _TEXTS.items()
@@ -212,18 +216,29 @@ _rule_options: Final[Decorator] = add_options(
         "--heartbeat",
         multiple=True,
         metavar="NODE=TIME±OFF",
-        help="Its period, as 3=100ms±20% or 3=100ms+-5ms.",
+        help="Check a heartbeat period, such as 3=100ms±20% or 3=100ms+-5ms.",
     ),
-    click.option("--nodes", multiple=True, metavar="NODES", help="Present on the bus, as 3,16-18."),
     click.option(
-        "--max-gap", multiple=True, metavar="CAN-ID=TIME", help="Comes again, as 181=20ms."
+        "--nodes", multiple=True, metavar="NODES", help="Require nodes on the bus, such as 3,16-18."
     ),
-    click.option("--known", multiple=True, metavar="CAN-IDS", help="No others, as 080,181-18F."),
+    click.option(
+        "--max-gap",
+        multiple=True,
+        metavar="CAN-ID=TIME",
+        help="Limit the gaps of a CAN-ID, such as 181=20ms.",
+    ),
+    click.option(
+        "--known",
+        multiple=True,
+        metavar="CAN-IDS",
+        help="Allow only these CAN-IDs, such as 080,181-18F.",
+    ),
     click.option(
         "--rule",
         multiple=True,
         metavar="RULE",
-        help="As 'node 3 operational within 2s', 'emcy never'; or NAME of an installed package.",
+        help="Check a rule, such as 'node 3 operational within 2s' or 'emcy never', or the name"
+        " of a rule of an installed package.",
     ),
 )
 """Decorator that adds each rule as an option."""
@@ -311,26 +326,28 @@ _MOST_AROUND: Final = 1_000
         type=click.IntRange(0, _MOST_AROUND),
         default=2,
         show_default=True,
-        help="Frames before and after what a RULE finds.",
+        help="Frames to show before and after a finding of --rule.",
     ),
     click.option(
         "--init", is_flag=True, help="Learn rules from a good log, and write them to -o or stdout."
     ),
-    click.option("-o", "output", type=PATH, metavar="FILE", help="The rules of --init: good.toml."),
+    click.option(
+        "-o", "output", type=PATH, metavar="FILE", help="Write the rules of --init to FILE."
+    ),
     click.option(
         "--max",
         "most",
         type=click.IntRange(1),
-        help="Findings that are shown (default: all; without a RULE 20, and 3 frames of each).",
+        help="Number of findings shown (default: all; without a rule, 20 with 3 frames each).",
     ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
-    click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
+    click.option("--jsonl", is_flag=True, help="Print findings as JSON, one per line."),
     click.option(
         "-t",
         "stamp",
         type=Choice([Stamp.ABSOLUTE.value, Stamp.ZERO.value, Stamp.DATE.value]),
-        help="Time: (a)bsolute, (z)ero at the first frame, (A)bsolute with date.",
+        help="Print times: (a)bsolute, (z)ero at the first frame, (A)bsolute with date.",
     ),
     decode_options.reopen_option,
 )

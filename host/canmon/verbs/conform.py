@@ -64,47 +64,67 @@ def _complete_only(
 
 
 _levels: Final[Decorator] = add_options(
-    click.option(f"--{_LEVELS[0]}", is_flag=True, help="Default."),
-    click.option(f"--{_LEVELS[1]}", is_flag=True, help="NMT, SYNC, PDO, writes."),
-    click.option(f"--{_LEVELS[2]}", is_flag=True, help="Reset, LSS, store, restore."),
+    click.option(f"--{_LEVELS[0]}", is_flag=True, help="Only read from the node (default)."),
+    click.option(f"--{_LEVELS[1]}", is_flag=True, help="Also test NMT, SYNC, PDO and writes."),
+    click.option(f"--{_LEVELS[2]}", is_flag=True, help="Also test reset, LSS, store and restore."),
 )
 _choice: Final[Decorator] = add_options(
     click.option("--node", type=click.IntRange(1, 127), metavar="N", help="Node-ID, 1 to 127."),
     eds_document.node_eds_option(),
     _levels,
-    click.option("--stimulus", metavar="CMD", help="Moves inputs: a command, a socket, or ask."),
-    click.option("--allow", multiple=True, metavar="INDEX", help="May be written, as 6200h."),
-    click.option("--never", multiple=True, metavar="INDEX", help="Is never written, as 2000h."),
+    click.option(
+        "--stimulus", metavar="CMD", help="Operate inputs by a command, control:PATH or ask."
+    ),
+    click.option(
+        "--allow", multiple=True, metavar="INDEX", help="Allow writes to INDEX, such as 6200h."
+    ),
+    click.option(
+        "--never", multiple=True, metavar="INDEX", help="Never write INDEX, such as 2000h."
+    ),
     click.option(
         "--max-load",
         type=_Percent(_LEAST_LOAD, 100),
         default=30,
         metavar="PERCENT",
-        help="Of the bus, by this tester; 30.",
+        help="Limit the bus load of the tester.  [30]",
     ),
-    click.option("--yes", is_flag=True, help="Ask nothing."),
+    click.option("--yes", is_flag=True, help="Do not ask for confirmation."),
     click.option(
         "--only",
         multiple=True,
         metavar="GROUP|ID",
         shell_complete=_complete_only,
-        help="As NMT, or UE-01,PR-*.",
+        help="Run only some checks, such as NMT or UE-01,PR-*.",
     ),
-    click.option("--list", "lists", is_flag=True, help="List the checks; judge nothing."),
+    click.option("--list", "lists", is_flag=True, help="List the checks and exit."),
     click.option(
-        "--seed", type=click.IntRange(0), default=0, metavar="N", help="Shuffles objects; 0: no."
+        "--seed",
+        type=click.IntRange(0),
+        default=0,
+        metavar="N",
+        help="Seed to shuffle the objects; 0 keeps their order.  [0]",
     ),
 )
 _reports: Final[Decorator] = add_options(
-    click.option("--json", "as_json", is_flag=True, help="JSON instead of text."),
-    click.option("--junit", type=PATH, metavar="FILE", help="JUnit, for CI."),
-    click.option("--html", type=PATH, metavar="FILE", help="One page with all frames."),
-    click.option("--badge", type=PATH, metavar="FILE", help="SVG for a README."),
+    click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
+    click.option("--junit", type=PATH, metavar="FILE", help="Write a JUnit report."),
+    click.option("--html", type=PATH, metavar="FILE", help="Write an HTML page with all frames."),
+    click.option("--badge", type=PATH, metavar="FILE", help="Write an SVG badge for a README."),
     click.option(
-        "--issue", type=PATH, metavar="FILE", help="Markdown: failures to file, with scripts."
+        "--issue",
+        type=PATH,
+        metavar="FILE",
+        help="Write the failures as a Markdown issue, with scripts.",
     ),
-    click.option("--baseline", type=PATH, metavar="FILE", help="Failures that are known."),
-    click.option("--write-baseline", type=PATH, metavar="FILE", help="Write those of this run."),
+    click.option(
+        "--baseline", type=PATH, metavar="FILE", help="Read known failures, which do not count."
+    ),
+    click.option(
+        "--write-baseline",
+        type=PATH,
+        metavar="FILE",
+        help="Write the failures of this run as a baseline.",
+    ),
 )
 
 

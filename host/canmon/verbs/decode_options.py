@@ -60,7 +60,8 @@ def eds_option(command: Callable[..., Any]) -> Callable[..., Any]:
         "--eds",
         multiple=True,
         metavar="NODE=FILE",
-        help="An EDS, DCF or XDD of a node, as 3=drive.eds, or of several, as 1-3=drive.eds.",
+        help="EDS, DCF or XDD of a node, such as 3=drive.eds, or of several, such as"
+        " 1-3=drive.eds.",
     )
 
     @functools.wraps(command)
@@ -73,7 +74,11 @@ def eds_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _dbc_option: Final = click.option(
-    "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."
+    "--dbc",
+    multiple=True,
+    type=PATH,
+    metavar="FILE",
+    help="Decode with a DBC file (extra tickrig[dbc]).",
 )
 decode_options: Final = add_options(eds_option, _dbc_option)
 """Decorator that adds `--eds` and `--dbc`. `make_decoder` uses their values."""
@@ -83,8 +88,8 @@ filter_option: Final = click.option(
     "--filter",
     "wanted",
     metavar="FILTER",
-    help="Only these: 'node=3 and (pdo or emcy)', 181-18F, 123:7FF,#FF, 'sdo[6040h]',"
-    " 'statusword.fault'.",
+    help="Take only frames that match FILTER, such as 'node=3 and (pdo or emcy)', 181-18F,"
+    " 123:7FF,#FF, 'sdo[6040h]' or 'statusword.fault'.",
 )
 """Decorator that adds `-F` as `wanted`. `read_filter` uses its value."""
 
@@ -158,11 +163,11 @@ SOURCE   can0                      a bus of SocketCAN, or of the interface that 
 """Part of the help text of a verb that takes SOURCE words."""
 
 strict_option: Final[Decorator] = click.option(
-    "--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."
+    "--strict", is_flag=True, help="Exit with status 4 on lost or invalid frames."
 )
 
 reopen_option: Final[Decorator] = click.option(
-    "--reopen", is_flag=True, help="Wait for a bus that goes away until it is back."
+    "--reopen", is_flag=True, help="If the bus goes away, wait until it is back."
 )
 
 
@@ -177,9 +182,11 @@ def cut_options(command: Callable[..., Any]) -> Callable[..., Any]:
             raise Refused(f"--to {end.text} is before --from {begin.text}")
         return command(*words, cut=LogCut(begin, end), **options)
 
-    end = log_time_option("--to", "end", help="End there, likewise.")
+    end = log_time_option("--to", "end", help="End at TIME, written as for --from.")
     return log_time_option(
-        "--from", "begin", help="Begin 2.5 s after the first frame of a log, or at a date."
+        "--from",
+        "begin",
+        help="Begin at TIME in a log, such as 2.5 (s after the first frame) or a date.",
     )(end(with_cut))
 
 

@@ -127,16 +127,24 @@ _shown: Final = add_options(
         "-t",
         "stamp",
         type=Choice([stamp.value for stamp in Stamp if stamp]),
-        help="Time: (a)bsolute, (d)elta, (z)ero at the first, (A)bsolute with date.",
+        help="Print times: (a)bsolute, (d)elta, (z)ero at the first frame, (A)bsolute with date.",
     ),
-    click.option("-x", "extra", is_flag=True, help="Show RX or TX."),
-    click.option("-e", "errors", is_flag=True, help="Error frames in words, with --raw too."),
-    click.option("-r", "--raw", is_flag=True, help="Bytes alone, as candump shows them."),
-    click.option("-L", "output", flag_value="log", help="Lines of a log, as candump -L."),
-    click.option("--jsonl", "output", flag_value="jsonl", help="One JSON object a line."),
-    click.option("--csv", "output", flag_value="csv", help="Rows with a header."),
+    click.option("-x", "extra", is_flag=True, help="Show the direction, RX or TX."),
     click.option(
-        "-l", "file", type=PATH, metavar="FILE", help="Into a log, as run.blf; nothing is shown."
+        "-e", "errors", is_flag=True, help="Describe error frames in words, also with --raw."
+    ),
+    click.option("-r", "--raw", is_flag=True, help="Show only bytes, in candump format."),
+    click.option(
+        "-L", "output", flag_value="log", help="Print lines of a log, in candump -L format."
+    ),
+    click.option("--jsonl", "output", flag_value="jsonl", help="Print one JSON object per line."),
+    click.option("--csv", "output", flag_value="csv", help="Print CSV rows with a header."),
+    click.option(
+        "-l",
+        "file",
+        type=PATH,
+        metavar="FILE",
+        help="Record to FILE, such as run.blf; print nothing.",
     ),
 )
 _ending: Final = add_options(
@@ -144,7 +152,11 @@ _ending: Final = add_options(
     decode_options.reopen_option,
     click.option("-n", "count", type=click.IntRange(1), metavar="N", help="End after N frames."),
     click.option(
-        "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
+        "-T",
+        "quiet_ms",
+        type=click.IntRange(1),
+        metavar="MS",
+        help="End after MS milliseconds without a frame.",
     ),
 )
 

@@ -159,17 +159,31 @@ _NO_TERMINAL: Final = (100, 28)
     type=PATH,
     callback=_checked_files,
     metavar="FILE",
-    help=".svg .html .png .csv",
+    help="Write a .svg, .html, .png or .csv file.",
 )
-@click.option("--title", default="", metavar="TEXT", help="Of a picture.")
-@log_time_option("--from", "begin", help="Begin 2.5 s after the first frame, or at a date.")
-@log_time_option("--to", "end", help="End there, likewise.")
-@log_time_option("--at", "at", help="Read out the values there, likewise.")
-@click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
+@click.option("--title", default="", metavar="TEXT", help="Title of the picture.")
+@log_time_option(
+    "--from",
+    "begin",
+    help="Begin at TIME in a log, such as 2.5 (s after the first frame) or a date.",
+)
+@log_time_option("--to", "end", help="End at TIME, written as for --from.")
+@log_time_option("--at", "at", help="Print the values at TIME, written as for --from.")
 @click.option(
-    "--size", metavar="WxH", default="960x400", callback=_size, help="Of a picture; 960x400 pixels."
+    "--range",
+    "ranges",
+    multiple=True,
+    metavar="AXIS=LOW..HIGH",
+    help="Range of an axis, such as 1=-5..5.",
 )
-@time_option("--window", "window_us", default="10s", help="Shown of a bus; 10s.")
+@click.option(
+    "--size",
+    metavar="WxH",
+    default="960x400",
+    callback=_size,
+    help="Size of the picture in pixels.  [960x400]",
+)
+@time_option("--window", "window_us", default="10s", help="Time span to show of a bus.  [10s]")
 @span_option
 @strict_option
 @bus_options

@@ -104,7 +104,7 @@ def _last_us(path: Path) -> int | None:
 
 @click.command()
 @click.argument("log", nargs=-1, required=True, type=PATH)
-@click.option("--jsonl", is_flag=True, help="One JSON object a file.")
+@click.option("--jsonl", is_flag=True, help="Print one JSON object per file.")
 def command(log: Sequence[Path], jsonl: bool) -> None:
     """Show what log files hold: format, size, buses, first and last time.
 

@@ -47,7 +47,7 @@ _MANY: Final = 1_000
     eds_option,
     span_option,
     cut_options,
-    click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end."),
+    click.option("--jsonl", is_flag=True, help="Print one JSON object per node, at the end."),
 )
 def command(  # noqa: PLR0913 - options
     *,

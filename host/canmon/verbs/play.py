@@ -188,12 +188,21 @@ def _log_path(word: str) -> Path:
 @click.command()
 @click.argument("log")
 @click.argument("buses", nargs=-1, metavar="[BUS|BUS=RECORDED...]")
-@click.option("--speed", default="1", metavar="FACTOR", help="2 is twice as fast; max.")
-@log_time_option("--from", "begin", help="Begin 2.5 s after its first frame, or at a date.")
-@log_time_option("--to", "end", help="End there, likewise.")
-@click.option("--loop", default="1", metavar="N", help="How often, or forever.")
+@click.option(
+    "--speed",
+    default="1",
+    metavar="FACTOR",
+    help="Speed factor, such as 2, or max for no gaps.  [1]",
+)
+@log_time_option(
+    "--from",
+    "begin",
+    help="Begin at TIME in a log, such as 2.5 (s after the first frame) or a date.",
+)
+@log_time_option("--to", "end", help="End at TIME, written as for --from.")
+@click.option("--loop", default="1", metavar="N", help="Play the log N times, or forever.  [1]")
 @click.option("--step", is_flag=True, help="Wait for Enter before each frame.")
-@click.option("--wait-rx", metavar="ID", help="Begin when this CAN-ID, as 581, is received.")
+@click.option("--wait-rx", metavar="ID", help="Begin when CAN-ID ID, such as 581, is received.")
 @bus_options
 @fd_options
 def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:

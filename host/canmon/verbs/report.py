@@ -51,16 +51,20 @@ _MOST_AROUND: Final = 200
 
 @decode_options.source_command(
     decode_options.decode_options,
-    click.option("-o", "page", type=PATH, metavar="FILE", help="The page, as run.html."),
-    click.option("--pdf", type=PATH, metavar="FILE", help="The page as PDF; needs Chromium."),
-    click.option("--png", type=PATH, metavar="FILE", help="The page as picture; needs Chromium."),
-    click.option("--title", metavar="TEXT", help="Of the page; else the name of the log."),
+    click.option(
+        "-o", "page", type=PATH, metavar="FILE", help="Write the page to FILE, such as run.html."
+    ),
+    click.option("--pdf", type=PATH, metavar="FILE", help="Write the page as PDF; needs Chromium."),
+    click.option(
+        "--png", type=PATH, metavar="FILE", help="Write the page as a PNG picture; needs Chromium."
+    ),
+    click.option("--title", metavar="TEXT", help="Title of the page.  [name of the log]"),
     click.option(
         "--around",
         type=click.IntRange(0, 100),
         default=10,
         show_default=True,
-        help="Frames before and after a finding.",
+        help="Frames to show before and after a finding.",
     ),
     listening.span_option,
     decode_options.cut_options,

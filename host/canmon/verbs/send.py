@@ -35,12 +35,24 @@ else:  # python-can is slow
 
 @click.command()
 @click.argument("words", nargs=-1, required=True, metavar="[BUS] FRAME...")
-@click.option("--every", metavar="TIME", help="Send again each 10ms, 1s, until Ctrl-C.")
+@click.option(
+    "--every", metavar="TIME", help="Send the frames every TIME, such as 10ms, until Ctrl-C."
+)
 @click.option("--count", type=click.IntRange(1), metavar="N", help="Stop after N times.")
-@click.option("--counter", multiple=True, metavar="BYTE:LOW..HIGH", help="Count in 0:0..255.")
-@click.option("--checksum", multiple=True, metavar="BYTE:KIND", help="Compute 7:crc8, 7:xor:0..6.")
+@click.option(
+    "--counter",
+    multiple=True,
+    metavar="BYTE:LOW..HIGH",
+    help="Write a counter to a byte, such as 0:0..255.",
+)
+@click.option(
+    "--checksum",
+    multiple=True,
+    metavar="BYTE:KIND",
+    help="Write a checksum to a byte, such as 7:crc8 or 7:xor:0..6.",
+)
 @eds_option
-@click.option("-q", "--quiet", is_flag=True, help="Do not print what is sent.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the sent frames.")
 @bus_options
 @fd_options
 def command(words: Sequence[str], eds: EdsOptions, **options: Any) -> None:

@@ -70,10 +70,12 @@ _FAILED: Final = 1
 
 @click.command(cls=BusCommand)
 @click.argument("words", nargs=-1, required=True, metavar="[BUS] FILE")
-@click.option("--var", "variables", multiple=True, metavar="NAME=NUMBER", help="Set id=3.")
+@click.option(
+    "--var", "variables", multiple=True, metavar="NAME=NUMBER", help="Set a variable, such as id=3."
+)
 @eds_option
-@click.option("--dry-run", is_flag=True, help="Print the steps; open no bus.")
-@click.option("-q", "--quiet", is_flag=True, help="Print only what was missed.")
+@click.option("--dry-run", is_flag=True, help="Print the steps without opening a bus.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only missed expectations.")
 @bus_options
 @click.pass_context
 def command(context: click.Context, /, words: Sequence[str], **options: Any) -> None:

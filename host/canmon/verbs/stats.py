@@ -205,11 +205,14 @@ def _line(what: str, **members: object) -> str:
 
 @source_command(
     click.option(
-        "--by", type=Choice(["id", "node"]), default="id", help="A row each (default: id)."
+        "--by",
+        type=Choice(["id", "node"]),
+        default="id",
+        help="Print one row per CAN-ID (default) or per node.",
     ),
     listening.span_option,
     cut_options,
-    click.option("--jsonl", is_flag=True, help="One JSON object a row."),
+    click.option("--jsonl", is_flag=True, help="Print one JSON object per row."),
 )
 def command(  # noqa: PLR0913 - options
     *,

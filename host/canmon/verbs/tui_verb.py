@@ -31,7 +31,12 @@ else:  # an extra
 
 @decode_options.source_command(
     click.option(
-        "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
+        "-w",
+        "--workspace",
+        "path",
+        type=PATH,
+        metavar="FILE",
+        help="Load and store the settings in FILE.",
     ),
     decode_options.decode_options,
     decode_options.reopen_option,

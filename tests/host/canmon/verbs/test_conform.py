@@ -150,7 +150,7 @@ def test_several_groups_are_named_at_once(rig: str) -> None:
         "NMT  NMT state machine and boot-up",
         "HB   Heartbeat producer and consumer",
     ]
-    assert "NMT, or UE-01,PR-*" in " ".join(conform("--help").stdout.split())
+    assert "NMT or UE-01,PR-*" in " ".join(conform("--help").stdout.split())
 
 
 def test_who_names_no_group_is_told_the_groups(rig: str) -> None:
