@@ -38,36 +38,44 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
 
 @click.command(cls=BusCommand)
 @click.option("--eds", type=PATH, help="EDS of the node.")
-@click.option("--dcf", type=PATH, help="DCF of the node; it may contain the node-ID.")
+@click.option("--dcf", type=PATH, help="DCF of the node, which may contain the node-ID.")
 @click.option(
     "--model",
     type=Choice(MODELS),
     metavar="NAME",
-    help=f"Model, which needs no file: {', '.join(MODELS)}.",
+    help=f"Emulate a built-in model; no file is needed: {', '.join(MODELS)}.",
 )
-@click.option("--rtc", metavar="FILE.py:Class", help="DeviceRTC: a component in your own file.")
-@click.option("--node-id", metavar="N", help="1..127, or lss for a node that waits for LSS.")
+@click.option(
+    "--rtc", metavar="FILE.py:Class", help="Emulate a DeviceRTC, a component in your own file."
+)
+@click.option("--node-id", metavar="N", help="Node-ID 1..127, or lss to get the node-ID by LSS.")
 @click.option(
     "--node",
     "nodes",
     multiple=True,
     metavar="N=FILE|MODEL",
     shell_complete=_complete_node,
-    help="One more node, such as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
+    help="Add a node, such as 5=a.eds or 5=epos; 1-20=a.eds adds twenty; may be repeated.",
 )
-@click.option("--rig", type=PATH, help="Rig file: its nodes, and the body that they move.")
+@click.option(
+    "--rig", type=PATH, help="Emulate the nodes of a rig file, and the body that they move."
+)
 @click.option(
     "--bus",
     "bus_file",
     type=PATH,
-    help="bus.yml of ros2_canopen or dcfgen: emulate each of its nodes, with motor and switches.",
+    help="Emulate each node of a bus.yml of ros2_canopen or dcfgen, with motor and switches.",
 )
-@click.option("--urdf", type=PATH, help="Robot with the joints of --bus, expanded by xacro.")
+@click.option(
+    "--urdf",
+    type=PATH,
+    help="URDF of the robot with the joints of --bus, already expanded by xacro.",
+)
 @click.option(
     "--profile",
     type=Choice(PROFILES),
     default=AUTO,
-    help="CiA profile of nodes of an EDS or DCF; auto uses the one of the device type. [auto]",
+    help="CiA profile of nodes of an EDS or DCF; auto selects by device type. [auto]",
 )
 @click.option(
     "--write-eds",
@@ -80,7 +88,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
     "--sdo-timeout",
     default="5s",
     metavar="TIME",
-    help="Silence of a client after which an SDO transfer is aborted.  [5s]",
+    help="Abort an SDO transfer after this silence of the client.  [5s]",
 )
 @click.option(
     "--sdo-memory",
@@ -88,7 +96,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
     metavar="SIZE",
     help="Memory for all strings and domains of a node, such as 4096, 64k, 16M. [64M]",
 )
-@click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
+@click.option("--trace", type=PATH, help="Record the bus in a file, as a candump log.")
 @run_options("drop, corrupt, duplicate, delay, babble, short", _device_faults)
 @click.pass_context
 def main(  # noqa: PLR0913 - options

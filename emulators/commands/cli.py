@@ -76,12 +76,12 @@ def demo(context: click.Context) -> None:
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Write the table as JSON, for programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
 @click.option(
     *("--need", "needs"),
     multiple=True,
     metavar="CHECK",
-    help="Exit status 1 without it: a name of the table, as socketcan or tui; may be repeated.",
+    help="Exit with status 1 if CHECK is missing, such as socketcan or tui; may be repeated.",
 )
 @works_in("tickrig.emulators.commands.doctor:run_doctor")
 def doctor(**options: Any) -> None:

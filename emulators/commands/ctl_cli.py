@@ -211,7 +211,9 @@ def set_(name: str, values: tuple[str, ...]) -> Object:
 
 @verb()
 @click.argument("name", shell_complete=_complete(_buttons))
-@click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
+@click.option(
+    "--for", "duration", default="100ms", help="How long to press, such as 500ms.  [100ms]"
+)
 def press(name: str, duration: str) -> Object:
     """Press the button NAME; it is released automatically. To hold it: set NAME 1.
 
@@ -223,7 +225,7 @@ def press(name: str, duration: str) -> Object:
 
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
-@click.option("--for", "duration", help="How long, as 2s.  [until it is cleared]")
+@click.option("--for", "duration", help="How long the fault lasts, such as 2s.  [until cleared]")
 def fault(spec: str, duration: str | None) -> Object:
     """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]].
 
@@ -263,7 +265,7 @@ def faults_() -> Object:
 
 
 @verb(_lines)
-@click.option("--since", type=int, default=0, help="Only those after the line of this number.")
+@click.option("--since", type=int, default=0, help="Show only the lines after this line number.")
 def lines(since: int) -> Object:
     """Show the latest lines on the wire, at most 100.
 

@@ -32,8 +32,8 @@ def new() -> None:
 
 @new.command()
 @click.argument("name")
-@click.option("--in", "folder", type=PATH, default=".", help="Where to make it.  [.]")
-@click.option("--binary", is_flag=True, help="Frames with a length and a CRC instead of lines.")
+@click.option("--in", "folder", type=PATH, default=".", help="Folder for the new package.  [.]")
+@click.option("--binary", is_flag=True, help="Exchange frames with a length and a CRC, not lines.")
 def device(name: str, folder: Path, binary: bool) -> None:
     """Write the package of a device on a serial line into a new folder NAME.
 
@@ -84,7 +84,7 @@ _TEMPLATES: Final = Path(__file__).with_name("template")
 
 _OF_LINES: Final = {
     "imports": "",
-    "fields": 'DeviceField(name="greeting", default="ready", help="What it says first."),',
+    "fields": 'DeviceField(name="greeting", default="ready", help="First line that it sends."),',
     "line": "baud=115_200",
 }
 """Texts in the device type of a device that answers lines."""

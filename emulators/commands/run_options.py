@@ -73,7 +73,7 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
         return [name for name in names if name.startswith(begun)]
 
     return add_options(
-        click.option("--scenario", type=PATH, help="Scenario to play; - reads standard input."),
+        click.option("--scenario", type=PATH, help="Play a scenario file; - reads standard input."),
         click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'."),
         click.option(
             "--fault",
@@ -81,7 +81,7 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
             multiple=True,
             metavar="NAME[=ARGUMENT][@FROM[-TO]]",
             shell_complete=complete,
-            help=f"Fault of the wire ({wire_faults}) or of the device; may be repeated.",
+            help=f"Inject a fault of the wire ({wire_faults}) or of the device; may be repeated.",
         ),
         click.option("--seed", type=int, default=0, help="Seed of the random wire faults. [0]"),
         click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
@@ -118,15 +118,16 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
         return [item.name for item in table if item.type.value == "fault"]
 
     return add_options(
-        click.option("--link", type=PATH, help="Symbolic link to make to the terminal."),
+        click.option("--link", type=PATH, help="Make a symbolic link to the terminal."),
         click.option(
             "--serve",
             multiple=True,
             metavar="URL",
             shell_complete=_complete_serve,
-            help="rfc2217://[HOST:]PORT or socket://[HOST:]PORT to serve; may be repeated.",
+            help="Serve the line at rfc2217://[HOST:]PORT or socket://[HOST:]PORT;"
+            " may be repeated.",
         ),
-        click.option("--trace", type=PATH, help="File to record the run in, for 'tickrig replay'."),
+        click.option("--trace", type=PATH, help="Record the run in a file, for 'tickrig replay'."),
         run_options(wire_faults, device_faults),
     )
 

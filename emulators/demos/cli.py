@@ -19,7 +19,7 @@ _LIVE: Final[Decorator] = add_options(
     click.option(
         "--control",
         type=PATH,
-        help="Control socket for tickrig rtc con and dis --at PATH; in real time until Ctrl-C.",
+        help="Control socket to serve, for 'tickrig rtc'; the run is in real time until Ctrl-C.",
     ),
     openrtm_options,
 )
@@ -39,7 +39,9 @@ def rrc() -> None:
 
 
 @click.command("rtc-lite")
-@click.option("--virtual", is_flag=True, help="In virtual time: the same lines each time, at once.")
+@click.option(
+    "--virtual", is_flag=True, help="Run in virtual time: at once, with the same lines each time."
+)
 @works_in("tickrig.emulators.demos.terminal_cli:show_rtc_lite")
 def rtc_lite(virtual: bool) -> None:
     """Send numbers through two emulated PICs, cut the power of one, and see it come back.
@@ -55,7 +57,9 @@ def rtc_lite(virtual: bool) -> None:
 
 
 @click.command()
-@click.option("--no-caches", is_flag=True, help="Entries of the caches do not outlive the outage.")
+@click.option(
+    "--no-caches", is_flag=True, help="Let the entries of the caches expire during the outage."
+)
 @works_in("tickrig.emulators.demos.terminal_cli:show_tkernel")
 def tkernel(no_caches: bool) -> None:
     """Let a robot find its position by infra-red markers while a service is unreachable.

@@ -11,12 +11,12 @@ FIELDS: Final = (
         name="power_on_event",
         choices=("PowerOnTrigger", "PowerOn"),
         default="PowerOnTrigger",
-        help="Name of the power-on event, as in the field or as in the manual.",
+        help="Name of the power-on event; PowerOn is that of the manual's table.",
     ),
     DeviceField(
         name="vehicle",
         kind=bool,
-        help="A vehicle behind VR2: speed, way and battery, with numbers of ours.",
+        help="Add a vehicle behind VR2: speed, distance and battery (not in the manual).",
     ),
     DeviceField(
         name="battery_wh",
@@ -25,7 +25,7 @@ FIELDS: Final = (
         high=100_000,
         default=1_200,
         unit="WH",
-        help="Capacity of the vehicle's battery.",
+        help="Capacity of the vehicle's battery.  [1200]",
         needs=("vehicle",),
     ),
 )

@@ -21,7 +21,7 @@ FIELDS: Final = (
         low=300,
         high=4_000_000,
         default=57_600,
-        help="Bit rate of the line, 8N1.  [57600]",
+        help="Bit rate of the line in bit/s, 8N1.  [57600]",
     ),
     DeviceField(
         name="timer_hz",
@@ -30,13 +30,13 @@ FIELDS: Final = (
         low=1,
         high=1_000,
         unit="HZ",
-        help="Execute by a timer of the device (type 22h) instead of by the proxy (21h).",
+        help="Execute by a timer of the device at HZ (type 22h), not by the proxy (21h).",
     ),
     DeviceField(
         name="framing",
         choices=tuple(framing.value for framing in Framing),
         default=Framing.LITE.value,
-        help="Frames of RTC-Lite, or packets of RTno.  [lite]",
+        help="Exchange frames of RTC-Lite, or packets of RTno.  [lite]",
     ),
     DeviceField(
         name="checksum",

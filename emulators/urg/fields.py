@@ -17,14 +17,14 @@ FIELDS: Final = (
         low=0,
         high=1,
         default=0.0,
-        help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
+        help="Noise, as a share of the sensor's accuracy of 10 mm or 1 %.  [0]",
         needs=("size", "walls", "posts"),
     ),
     DeviceField(
         name="scip",
         choices=("1.1", "2.0"),
         default="1.1",
-        help="Protocol after power-up: 1.1 as the URG-04LX, 2.0 as the URG-04LX-UG01.  [1.1]",
+        help="SCIP version after power-up: 1.1 (URG-04LX) or 2.0 (URG-04LX-UG01).  [1.1]",
     ),
     DeviceField(
         name="baud",
@@ -32,11 +32,27 @@ FIELDS: Final = (
         low=1_200,
         high=USB_BAUD,
         default=USB_BAUD,
-        help="Bit rate of RS-232C after power-up, which SS changes.  [12000000, as USB]",
+        help="Bit rate of RS-232C after power-up in bit/s; the command SS changes the rate."
+        "  [12000000, as USB]",
     ),
     DeviceField(
-        name="size", option="room", unit="WIDTH,DEPTH", help="Four walls around the origin, m."
+        name="size",
+        option="room",
+        unit="WIDTH,DEPTH",
+        help="Put four walls around the origin, in m.",
     ),
-    DeviceField(name="walls", option="wall", many=True, unit="X1,Y1,X2,Y2", help="A wall, m."),
-    DeviceField(name="posts", option="post", many=True, unit="X,Y,RADIUS", help="A round post, m."),
+    DeviceField(
+        name="walls",
+        option="wall",
+        many=True,
+        unit="X1,Y1,X2,Y2",
+        help="Add a wall, in m; may be repeated.",
+    ),
+    DeviceField(
+        name="posts",
+        option="post",
+        many=True,
+        unit="X,Y,RADIUS",
+        help="Add a round post, in m; may be repeated.",
+    ),
 )

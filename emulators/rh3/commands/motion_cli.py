@@ -35,7 +35,7 @@ _SHARED: Final[Decorator] = add_options(
         show_default=True,
         help="Configuration set: default (values of the specification) or tuned (more precise).",
     ),
-    click.option("--device", metavar="URL", help="Serial port of a base; default: emulate one."),
+    click.option("--device", metavar="URL", help="Serial port of a base.  [an emulated base]"),
     click.option(
         "--any-device",
         is_flag=True,
@@ -46,18 +46,20 @@ _SHARED: Final[Decorator] = add_options(
         type=click.IntRange(1_200, 4_000_000),
         default=115_200,
         show_default=True,
-        help="Bit rate of the device, 8N1.",
+        help="Bit rate of the device in bit/s, 8N1.",
     ),
     click.option(
         "--pace",
         type=NumberRange(0.01, 1_000),
         metavar="X",
-        help="Speed of virtual time, 1 is real time; without it as fast as possible.",
+        help="Speed of virtual time; 1 is real time.  [as fast as possible]",
     ),
-    click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
-    click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
+    click.option(
+        "--odometry-conf", "conf", type=PATH, help="File with lines conf.default.NAME: VALUE."
+    ),
+    click.option("--map/--no-map", "show_map", default=None, help="Draw the track during the run."),
     device_options(PARAMETERS),
-    click.option("--seed", type=int, default=0, help="Of the noise.  [0]"),
+    click.option("--seed", type=int, default=0, help="Seed of the noise.  [0]"),
 )
 
 
@@ -117,9 +119,13 @@ def _along_path(file: Path, **options: Any) -> None:
 
 
 @main.command()
-@click.option("--runs", type=click.IntRange(1, 100), help="Squares each way. [1, 5 with noise]")
-@click.option("--side", type=NumberRange(0.2, 100), metavar="M", help="Of the squares.  [4]")
-@click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
+@click.option(
+    "--runs",
+    type=click.IntRange(1, 100),
+    help="Squares in each direction. [1; 5 with noise or --device]",
+)
+@click.option("--side", type=NumberRange(0.2, 100), metavar="M", help="Side of the squares.  [4]")
+@click.option("--save", type=PATH, help="Write the corrected Odometry.conf to a file.")
 @_SHARED
 @works_in(f"{_WORK}:go_round")
 def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
@@ -143,12 +149,12 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
     nargs=2,
     type=NumberRange(0.1, 1_000),
     metavar="WIDTH DEPTH",
-    help="Walls around an emulated base in m, and a range finder that sees them.",
+    help="Put walls around the emulated base, in m, and a range finder on the base.",
 )
 @click.option(
     "--control",
     type=PATH,
-    help="Control socket, for tickrig ctl PATH goal and tickrig rtc --at PATH.",
+    help="Control socket to serve, for 'tickrig ctl PATH goal' and 'tickrig rtc --at PATH'.",
 )
 @_SHARED
 @works_in(f"{_WORK}:serve")

@@ -10,7 +10,7 @@ import click
 from tickrig.host.cli.options import PATH, time_option, works_in
 
 _RUN: Final = "run"
-_OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
+_OUTPUT: Final = "Write the table to a .csv or .parquet file; may be repeated."
 
 
 class _CampaignGroup(click.Group):
@@ -57,19 +57,26 @@ def campaign() -> None:
     "parameters",
     multiple=True,
     metavar="NAME=V,V",
-    help="Values of an argument or fixture of the tests, each with all seeds; may be repeated.",
+    help="Run all seeds with each value of the argument or fixture NAME; may be repeated.",
 )
-@click.option("--shard", default="1/1", metavar="K/N", help="Do the K-th of N parts of the runs.")
+@click.option(
+    "--shard",
+    default="1/1",
+    metavar="K/N",
+    help="Do only part K of N parts of the runs, such as 3/8.",
+)
 @click.option(
     "-o", "--output", "outputs", multiple=True, type=PATH, help=_OUTPUT + "  [campaign.csv]"
 )
-@click.option("-j", "--workers", type=click.IntRange(1, 1000), help="Processes. [one per core]")
+@click.option(
+    "-j", "--workers", type=click.IntRange(1, 1000), help="Number of processes. [one per core]"
+)
 @time_option("--timeout", "timeout_us", default="60s", help="Time-out of a run. [60s]")
 @click.option("--bench", default="", metavar="RIG.TOML", help="Rig file of the bench.")
 @click.option(
-    "-k", "keyword", default="", metavar="EXPRESSION", help="Tests by name, as for pytest."
+    "-k", "keyword", default="", metavar="EXPRESSION", help="Select tests by name, as in pytest."
 )
-@click.option("--scheduler", default="", metavar="URL", help="Run on this Dask cluster.")
+@click.option("--scheduler", default="", metavar="URL", help="Run on the Dask cluster at URL.")
 @click.option("--fresh", is_flag=True, help="Start again, and replace earlier results.")
 @works_in("tickrig.emulators.testing.commands.campaign_run:run")
 def run(**options: Any) -> None:

@@ -11,7 +11,7 @@ from tickrig.host.cli.options import PATH, works_in
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@click.option("--strict", is_flag=True, help="Warnings of a bus.yml count as errors, too.")
+@click.option("--strict", is_flag=True, help="Count warnings of a bus.yml as errors, too.")
 @works_in("tickrig.emulators.testing.commands.check:check_files")
 def check(**options: Any) -> None:
     """Check rig files and bus.yml: list the devices on the bench, or all errors.

@@ -12,12 +12,21 @@ from tickrig.host.cli.options import PATH, add_options, run_code_option, time_op
 _device: Final = add_options(
     type_option("Device type, if the trace has none."),
     click.option(
-        "--config", multiple=True, metavar="NAME=VALUE", help="An option of that type: node=lite-a."
+        "--config",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Option of the device type, such as node=lite-a.",
     ),
     click.option(
-        "--node", "nodes", multiple=True, metavar="ID=DEVICE", help="On a bus: 5=epos, 5=drive.eds."
+        "--node",
+        "nodes",
+        multiple=True,
+        metavar="ID=DEVICE",
+        help="Node on a bus, such as 5=epos or 5=drive.eds.",
     ),
-    time_option("--settle", "settle_us", default="1s", help="Time on before the recording. [1s]"),
+    time_option(
+        "--settle", "settle_us", default="1s", help="Time from power-on to the recording. [1s]"
+    ),
 )
 _tolerance: Final = add_options(
     time_option("--tolerance", "time_us", default="20ms", help="Tolerance of times. [20ms]"),
@@ -26,11 +35,17 @@ _tolerance: Final = add_options(
         "numbers",
         multiple=True,
         metavar="PATTERN=MOST",
-        help="Largest difference of numbers in lines: 'EV:batt*=5', '181#*[2:4]=1%'.",
+        help="Largest difference of numbers in lines, such as 'EV:batt*=5' or '181#*[2:4]=1%'.",
     ),
-    click.option("--ignore", multiple=True, metavar="PATTERN", help="Lines to ignore."),
     click.option(
-        "--kind", "kinds", multiple=True, metavar="PATTERN", help="Lines with an independent order."
+        "--ignore", multiple=True, metavar="PATTERN", help="Ignore lines that match PATTERN."
+    ),
+    click.option(
+        "--kind",
+        "kinds",
+        multiple=True,
+        metavar="PATTERN",
+        help="Compare the order of lines that match PATTERN separately.",
     ),
 )
 
@@ -40,7 +55,7 @@ _tolerance: Final = add_options(
 @_device
 @_tolerance
 @run_code_option
-@click.option("-v", "--verbose", is_flag=True, help="List all lines, also equal ones.")
+@click.option("-v", "--verbose", is_flag=True, help="List all lines, not only different ones.")
 @works_in("tickrig.emulators.testing.commands.compare:run_compare")
 def compare_command(**options: Any) -> None:
     """Replay a recorded host against an emulator; report differences from the recording.

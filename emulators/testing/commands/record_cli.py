@@ -12,10 +12,16 @@ from tickrig.host.cli.options import PATH, works_in
 
 @click.command("record")
 @click.argument("port")
-@click.option("-o", "--out", type=PATH, required=True, metavar="FILE", help="The trace.")
-@type_option("Device type, as for 'tickrig emu': rrc.")
-@click.option("--link", type=PATH, help="Symbolic link to make to the host's terminal.")
-@click.option("--baud", type=click.IntRange(1), help="Bit rate. [that of the type, or 115200]")
+@click.option(
+    "-o", "--out", type=PATH, required=True, metavar="FILE", help="Write the trace to FILE."
+)
+@type_option("Device type, as for 'tickrig emu', such as rrc.")
+@click.option("--link", type=PATH, help="Make a symbolic link to the host's terminal.")
+@click.option(
+    "--baud",
+    type=click.IntRange(1),
+    help="Bit rate of the line in bit/s. [that of the type, or 115200]",
+)
 @works_in("tickrig.emulators.testing.commands.port_tap:record_port")
 def record_command(**options: Any) -> None:
     """Record the traffic between a host and the device at PORT, for `tickrig compare`.

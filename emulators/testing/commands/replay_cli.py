@@ -11,11 +11,13 @@ from tickrig.host.cli.options import PATH, run_code_option, works_in
 
 @click.command("replay")
 @click.argument("file", type=PATH)
-@click.option("-v", "--verbose", is_flag=True, help="Each device: its ticks, and what differs.")
+@click.option(
+    "-v", "--verbose", is_flag=True, help="Show the ticks and the differences of each device."
+)
 @click.option(
     "--host",
     metavar="FILE.py:Class",
-    help="FILE is a scenario that check_host has printed: run it with this BenchMachine.",
+    help="Run FILE, a scenario that check_host has printed, with this BenchMachine.",
 )
 @run_code_option
 @works_in("tickrig.emulators.testing.commands.replay:run_replay")

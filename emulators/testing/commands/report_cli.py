@@ -12,9 +12,14 @@ from tickrig.host.cli.options import PATH, works_in
 @click.command("report")
 @click.argument("runs", metavar="RUN.json...", nargs=-1, required=True, type=PATH)
 @click.option(
-    "-o", "--output", metavar="FILE", required=True, type=PATH, help="The page; JSON as FILE.json."
+    "-o",
+    "--output",
+    metavar="FILE",
+    required=True,
+    type=PATH,
+    help="Write an HTML page, or JSON if FILE ends in .json.",
 )
-@click.option("--title", default="", help="Of the page; that of the first run unless given.")
+@click.option("--title", default="", help="Title of the page.  [title of the first run]")
 @works_in("tickrig.emulators.testing.commands.report:make_report")
 def report_command(runs: tuple[Path, ...], output: Path, title: str) -> None:
     """Make one HTML page of test runs that were kept as JSON.

@@ -11,16 +11,18 @@ from tickrig.host.cli.options import PATH, time_option, works_in
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("--virtual", is_flag=True, help="In virtual time, as fast as it goes; wants --for.")
-@time_option("--for", "for_us", help="How long, as 10s.  [until Ctrl-C]")
+@click.option(
+    "--virtual", is_flag=True, help="Run in virtual time, as fast as possible; needs --for."
+)
+@time_option("--for", "for_us", help="End after this time, such as 10s.  [at Ctrl-C]")
 @click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'.")
-@click.option("--trace", type=PATH, help="File to record the run in, for 'tickrig replay'.")
+@click.option("--trace", type=PATH, help="Record the run in a file, for 'tickrig replay'.")
 @click.option(
     "--fault",
     "faults",
     multiple=True,
     metavar="[OWNER/]NAME[=ARGUMENT][@FROM[-TO]]",
-    help="One more fault of a device or a wire; may be repeated.",
+    help="Add a fault of a device or a wire; may be repeated.",
 )
 @click.option(
     *("--plot", "plots"),
@@ -33,10 +35,10 @@ from tickrig.host.cli.options import PATH, time_option, works_in
     multiple=True,
     type=PATH,
     metavar="FILE",
-    help="Of --plot: .png .svg .html .csv.  [the terminal]",
+    help="Write the plot to FILE: .png, .svg, .html or .csv.  [the terminal]",
 )
-@click.option("--report", type=PATH, metavar="FILE.html", help="Write the run as a page.")
-@click.option("--seed", type=click.IntRange(0), help="Seed of all chance.  [that of FILE]")
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write a page about the run.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of all random values.  [that of FILE]")
 @click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line and frame.")
 @works_in("tickrig.emulators.testing.commands.bench_run:run_bench")
 def run(**options: Any) -> None:

@@ -34,9 +34,9 @@ MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
     "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
     "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
-    "allows(*what): what may happen though no fault ordered it: 'lost' for what found a buffer "
-    "full, 'error frames', 'threads' that die, 'clock' for looks at the machine's in virtual "
-    "time, and 'long waits' of hosts (tickrig)",
+    "allows(*what): allow events that otherwise fail the test: 'lost' (data lost in a full "
+    "buffer), 'error frames', 'threads' (a thread that dies), 'clock' (calls of the "
+    "machine's clock in virtual time), and 'long waits' of hosts (tickrig)",
 )
 
 _PLUGINS: Final = {

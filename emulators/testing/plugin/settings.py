@@ -45,16 +45,27 @@ class _Option(NamedTuple):
 
 
 OPTIONS: Final = (
-    _Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
-    _Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
-    _Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
-    _Option("bench_limit", "TIME", "end a host that waits for so long in virtual time, or `none`"),
-    _Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
-    _Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
-    _Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
+    _Option("bench", "RIG.TOML", "rig file of the bench, instead of the fixture `bench_config`"),
+    _Option(
+        "bench_mode",
+        "MODE",
+        "run each test in MODE: virtual, real or hardware, or several, such as virtual,real",
+    ),
+    _Option("bench_seed", "N", "seed of all random values, or `random` to choose and print a seed"),
+    _Option("bench_limit", "TIME", "longest time that a host may wait in virtual time, or `none`"),
+    _Option(
+        "bench_artifacts", "DIR", "save trace, candump log and transcript of failed tests in DIR"
+    ),
+    _Option("bench_artifacts_of", "WHICH", "tests for --bench-artifacts: failed or every"),
+    _Option("bench_compare", "", "run each test twice; the test fails if the runs differ"),
     _Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
-    _Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
-    _Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
+    _Option("bench_requirements", "FILE", "requirements that the report must cover, one per line"),
+    _Option(
+        "bench_param",
+        "NAME=V,V",
+        "run tests that take NAME with each value; may be repeated",
+        many=True,
+    ),
 )
 
 

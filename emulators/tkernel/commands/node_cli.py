@@ -12,25 +12,30 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 
 @click.command(cls=HarmlessCommand)
 @click.argument("system", type=PATH, required=False)
-@click.option("--urg", metavar="URL", help="Line of a range finder: its component runs here.")
-@click.option("--ucode", metavar="URL", help="Line of a ucode reader: three components run here.")
+@click.option("--urg", metavar="URL", help="Run the component of the range finder at URL.")
+@click.option("--ucode", metavar="URL", help="Run the three components of the ucode reader at URL.")
 @click.option(
     "--service", default="", metavar="URL", help="URL of the ucode service. [http://127.0.0.1:8640]"
 )
-@click.option("--control", type=PATH, help="Control socket of its system, for 'tickrig rtc --at'.")
+@click.option(
+    "--control", type=PATH, help="Control socket of the RT components, for 'tickrig rtc --at'."
+)
 @click.option("--board", type=PATH, help="Control socket of the board, for 'tickrig ctl'.")
 @click.option("--connectors", type=int, default=8, help="Largest number of connectors. [8]")
 @click.option(
-    "--message-octets", type=int, default=4_096, help="Largest size of a value as CDR. [4096]"
+    "--message-octets",
+    type=int,
+    default=4_096,
+    help="Largest size of a value as CDR, in bytes. [4096]",
 )
-@click.option("--tick", default="10ms", help="Periods are multiples of this.  [10ms]")
-@click.option("--boot", default="3s", help="Time from power-up until it answers. [3s]")
+@click.option("--tick", default="10ms", help="Period of which all others are multiples.  [10ms]")
+@click.option("--boot", default="3s", help="Time from power-up until the board answers. [3s]")
 @click.option(
     "--fault",
     "faults",
     multiple=True,
     metavar="NAME[@FROM[-TO]]",
-    help="power_cut; may be repeated.",
+    help="Inject a fault: power_cut; may be repeated.",
 )
 @openrtm_options
 @version_option()

@@ -23,7 +23,7 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
     "faults",
     multiple=True,
     metavar="NAME[@FROM[-TO]]",
-    help="unreachable, slow, unknown_ucode or broken; may be repeated.",
+    help="Inject a fault: unreachable, slow, unknown_ucode or broken; may be repeated.",
 )
 @click.option("--example", is_flag=True, help="Print an example table, and exit.")
 @version_option()

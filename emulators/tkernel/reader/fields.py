@@ -8,7 +8,11 @@ from tickrig.emulators.fields import DeviceField
 
 FIELDS: Final = (
     DeviceField(
-        name="markers", option="marker", many=True, unit="UCODE,X,Y", help="A marker, place in m."
+        name="markers",
+        option="marker",
+        many=True,
+        unit="UCODE,X,Y",
+        help="Add a marker at X,Y in m; may be repeated.",
     ),
     DeviceField(
         name="range_m",
@@ -18,7 +22,7 @@ FIELDS: Final = (
         high=99,
         default=3.0,
         unit="M",
-        help="Range at which it receives a marker. [3]",
+        help="Distance up to which the reader receives a marker. [3]",
     ),
     DeviceField(
         name="cone_deg",
@@ -28,6 +32,6 @@ FIELDS: Final = (
         high=360,
         default=90,
         unit="DEG",
-        help="Full angle of reception around its heading. [90]",
+        help="Full angle of reception around the reader's heading. [90]",
     ),
 )
