@@ -96,13 +96,17 @@ class _RrcGroup(HarmlessCommand, click.Group):
 )
 @click.option("--panel", is_flag=True, help="Show a panel in this terminal, and drive by keys.")
 @click.option(
-    "--pad", metavar="DEVICE", help="Drive by a game pad while a button is held: /dev/input/event5."
+    "--pad",
+    metavar="DEVICE",
+    help="Drive by a game pad, such as /dev/input/event5, while a button is held.",
 )
 @time_option(
     "--watchdog", "watchdog_us", help="Time without a command after which VR2 stops. [500ms]"
 )
-@click.option("--no-watchdog", is_flag=True, help="No watchdog: nothing stops VR2 after a crash.")
-@click.option("--no-stablemode", is_flag=True, help="Leave CHECK and OK lines as they are.")
+@click.option(
+    "--no-watchdog", is_flag=True, help="Use no watchdog: nothing stops VR2 after a crash."
+)
+@click.option("--no-stablemode", is_flag=True, help="Do not switch on stablemode (checksums).")
 @version_option()
 @click.pass_context
 def main(context: click.Context, /, url: str, *, panel: bool, **guard: Any) -> None:
@@ -158,7 +162,7 @@ def _watchdog(time_us: int | None, *, off: bool) -> int:
     return time_us
 
 
-_for_option: Final = time_option("--for", "for_us", help="End after this time.")
+_for_option: Final = time_option("--for", "for_us", help="End after this time, such as 10s.")
 _json_option: Final = click.option(
     "--json", "as_json", is_flag=True, help="Print the answer as JSON."
 )
@@ -171,7 +175,9 @@ def _number(option: str, name: str, kind: click.IntRange, default: int, text: st
 
 def _bound(option: str, name: str, what: str) -> Decorator:
     """Return an option that limits a quantity of `rrc limit`."""
-    return click.option(option, name, type=_BYTE, default=255, help=f"Most of {what}.  [no limit]")
+    return click.option(
+        option, name, type=_BYTE, default=255, help=f"Limit of {what} in %.  [no limit]"
+    )
 
 
 def _pair(option: str, kind: click.IntRange, default: int, text: str) -> Decorator:
@@ -202,7 +208,7 @@ def _status(**options: Any) -> None:
 @click.argument("w_pct", metavar="W", type=_SIGNED)
 @_speed_option
 @_for_option
-@click.option("--no-dead-man", is_flag=True, help="Drive without a held key; needs --for.")
+@click.option("--no-dead-man", is_flag=True, help="Drive without a dead-man key; needs --for.")
 @works_in(f"{_VERBS}:drive")
 def _drive(**options: Any) -> None:
     """Drive: V forward and W to the right, -100..100 % each.
@@ -227,7 +233,9 @@ def _drive(**options: Any) -> None:
 @_bound("--radius", "radius_pct", "the root of v² + w²")
 @_speed_option
 @_for_option
-@click.option("--leave", is_flag=True, help="End at once; the stick stays on, without watchdog.")
+@click.option(
+    "--leave", is_flag=True, help="End at once; the stick keeps driving, without watchdog."
+)
 @works_in(f"{_VERBS}:limit")
 def _limit(**options: Any) -> None:
     """Drive by the stick: V % forward and W % of rotation at most.
@@ -242,19 +250,19 @@ def _limit(**options: Any) -> None:
 
 
 @main.command("stick")
-@_pair("--low", _PERCENT, 0, "Counts as 0.")
-@_pair("--high", _PERCENT, 100, "Counts as 100.")
+@_pair("--low", _PERCENT, 0, "Largest value in % that counts as 0.")
+@_pair("--high", _PERCENT, 100, "Smallest value in % that counts as 100.")
 @_pair("--exponent", _NIBBLE, 0, "Output is input ^ (1 + 0.1 * exponent), 0..15.")
 @_number(
     "--reverse",
     "reverse_mode",
     click.IntRange(0, 3),
     0,
-    "0 plain, 1 no backing, 2 gears, 3 gears, backing toward the stick.",
+    "Driving backward: 0 plain, 1 never, 2 by gears, 3 by gears, rotation reversed.",
 )
-@_number("--neutral", "neutral_pct", _PERCENT, 5, "Radius of rest, gears.")
-@_number("--switch", "switch_deg", _ANGLE, 30, "Angle up to which R is chosen.")
-@_number("--fade", "fade_deg", _ANGLE, 45, "Angle from which R fades.")
+@_number("--neutral", "neutral_pct", _PERCENT, 5, "Radius of neutral in %, for gears.")
+@_number("--switch", "switch_deg", _ANGLE, 30, "Largest angle in deg that selects gear R.")
+@_number("--fade", "fade_deg", _ANGLE, 45, "Angle in deg from which gear R slows.")
 @works_in(f"{_VERBS}:stick")
 def _stick(**options: Any) -> None:
     """Shape the stick: dead zones, exponents, and backing.
@@ -307,7 +315,7 @@ def _poweroff(**options: Any) -> None:
 @main.command("watch")
 @_for_option
 @click.option("--all", "every", is_flag=True, help="Print each status line, not only changes.")
-@click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a line.")
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Print one JSON object per line.")
 @works_in(f"{_VERBS}:watch")
 def _watch(**options: Any) -> None:
     """Print events and changes of the status line until Ctrl-C.
@@ -320,7 +328,10 @@ def _watch(**options: Any) -> None:
 
 @main.command("test")
 @click.option(
-    "--json", "json_path", metavar="FILE", help="Write the results, - is standard output."
+    "--json",
+    "json_path",
+    metavar="FILE",
+    help="Write the results to FILE as JSON; - is standard output.",
 )
 @works_in(f"{_VERBS}:test")
 def _test(**options: Any) -> None:

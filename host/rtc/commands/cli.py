@@ -49,27 +49,29 @@ def rtc() -> None:
     "components",
     multiple=True,
     metavar="FILE.py:Class",
-    help="Another type of components; may be repeated.",
+    help="Add a type of components; may be repeated.",
 )
 @click.option(
     "--lite",
     "lites",
     multiple=True,
     metavar="NAME=URL[@BAUD][,rtno][,boot=TIME]",
-    help="A device of RTC-Lite, or a board with RTno, at a pyserial URL; its proxy is NAME0."
-    " May be repeated.",
+    help="Add a proxy NAME0 of a device of RTC-Lite, or of a board with RTno, at a pyserial URL;"
+    " may be repeated.",
 )
 @click.option(
     "--lite-boot",
     default="0s",
     metavar="TIME",
-    help="Silence once a line is open, as 3s.  [0s, rtno 3s]",
+    help="Pause after a line is opened, such as 3s.  [0s, rtno 3s]",
 )
 @click.option(
     "--rate", "rate_hz", type=NumberRange(1e-6, 1e6), metavar="HZ", help="Rate of all components."
 )
-@click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
-@click.option("--console", is_flag=True, help="Lines typed here go to components that take them.")
+@click.option("--save", type=PATH, help="Write the system to a .toml or .xml file at the end.")
+@click.option(
+    "--console", is_flag=True, help="Send typed lines to the components that accept them."
+)
 @openrtm_options
 @ros2_options
 @works_in("tickrig.host.rtc.commands.run:run_system")

@@ -173,7 +173,7 @@ def get(at: Path, name: str, parameter: str) -> None:
 @_component_name
 @click.argument("parameter")
 @click.argument("value")
-@click.option("--set", "set_id", default="", help="The set to change.  [the active one]")
+@click.option("--set", "set_id", default="", help="Set to change.  [the active set]")
 @at
 def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
     """Change PARAMETER to VALUE. Separate the elements of a list by commas.
@@ -212,8 +212,8 @@ _names_needed = click.argument("names", nargs=-1, required=True, shell_complete=
 
 @click.command()
 @_some_names
-@click.option("-l", "--long", is_flag=True, help="Show state, ports, rate and type, too.")
-@click.option("-R", "--recursive", is_flag=True, help="Show the ports of each component, too.")
+@click.option("-l", "--long", is_flag=True, help="Also show state, ports, rate and type.")
+@click.option("-R", "--recursive", is_flag=True, help="Also show the ports of each component.")
 @as_json
 @at
 def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: bool) -> None:
@@ -237,7 +237,12 @@ def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: b
 
 @click.command()
 @_names_needed
-@click.option("-l", "--long", is_flag=True, help="Show properties of connectors, and all sets.")
+@click.option(
+    "-l",
+    "--long",
+    is_flag=True,
+    help="Also show properties of connectors, and the values of all sets.",
+)
 @as_json
 @at
 def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
@@ -258,7 +263,7 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
 @click.command()
 @click.argument("type_name", metavar="TYPE", shell_complete=complete_type)
 @click.argument("name", default="")
-@click.option("--rate", "rate_hz", type=NumberRange(1e-6, 1e6), help="In Hz.  [1000]")
+@click.option("--rate", "rate_hz", type=NumberRange(1e-6, 1e6), help="Rate in Hz.  [1000]")
 @at
 def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
     """Create a component of TYPE, and print its name, such as ConsoleIn0.
@@ -274,7 +279,14 @@ def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
 @click.command()
 @click.argument("first", shell_complete=complete_port)
 @click.argument("second", shell_complete=complete_port)
-@click.option("-p", "--property", "properties", multiple=True, metavar="KEY=VALUE")
+@click.option(
+    "-p",
+    "--property",
+    "properties",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Property of the connector; may be repeated.",
+)
 @click.option("-n", "--name", default="", help="Name of the connector.")
 @at
 def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: str) -> None:
@@ -343,8 +355,8 @@ def inject(at: Path, port: str, value: str) -> None:
 @click.command("print")
 @click.argument("port", shell_complete=complete_port)
 @click.option("-n", "count", type=click.IntRange(1), help="End after this many values.")
-@click.option("--for", "duration", metavar="TIME", help="End after this time, as 2s.")
-@click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a value.")
+@click.option("--for", "duration", metavar="TIME", help="End after this time, such as 10s.")
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Print one JSON object per value.")
 @at
 def _print(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
     """Print what the OutPort PORT writes from now on, one value per line, until Ctrl-C.
@@ -370,7 +382,9 @@ def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
 
     @click.command(name, help=f"{told}\n\n\b\n{example}")
     @_names_needed
-    @click.option("--wait", default="2s", help="How long to wait for it; 0 asks only.  [2s]")
+    @click.option(
+        "--wait", default="2s", help="How long to wait for the state; 0 does not wait.  [2s]"
+    )
     @at
     def move(at: Path, names: tuple[str, ...], wait: str) -> None:
         wait_us = time_us("--wait", wait)

@@ -15,10 +15,12 @@ from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE
 
 @click.command(cls=HarmlessCommand)
 @click.argument("profile", type=PATH, required=False)
-@click.option("-o", "--out", type=PATH, metavar="DIR", help="Write the files there; DIR is made.")
-@click.option("--force", is_flag=True, help="Overwrite the skeleton, which is yours to fill.")
-@click.option("--all", "every", is_flag=True, help="Show every object, not only those of ports.")
-@click.option("--example", is_flag=True, help="Print a profile to begin with, and end.")
+@click.option(
+    "-o", "--out", type=PATH, metavar="DIR", help="Write the files to DIR; create DIR if needed."
+)
+@click.option("--force", is_flag=True, help="Overwrite the skeleton, even if you have filled it.")
+@click.option("--all", "every", is_flag=True, help="Show all objects, not only those of ports.")
+@click.option("--example", is_flag=True, help="Print an example profile, and exit.")
 @version_option()
 def main(
     profile: Path | None, out: Path | None, *, force: bool, every: bool, example: bool

@@ -19,7 +19,7 @@ from tickrig.host.rtc.canopen.commands.server import component_option
 @click.argument("file", type=PATH)
 @bus_options
 @component_option
-@click.option("--log", type=PATH, help="File for the events, a line of JSON each.")
+@click.option("--log", type=PATH, help="Write the events to a file, one JSON object per line.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
 @version_option()
 def main(

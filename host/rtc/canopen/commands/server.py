@@ -20,7 +20,7 @@ component_option: Final[Decorator] = click.option(
     "components",
     multiple=True,
     metavar="NAME=FILE.py:Class",
-    help="An RT component beside the proxies, Active at once; may be repeated.",
+    help="Run an RT component in addition to the proxies, Active at once; may be repeated.",
 )
 
 
@@ -28,13 +28,19 @@ component_option: Final[Decorator] = click.option(
 @click.argument("file", type=PATH)
 @bus_options
 @component_option
-@click.option("--log", type=PATH, help="File for the events, a line of JSON each (- is stdout).")
-@click.option("--for", "span", metavar="TIME", help="End after 90s, 500ms; else at Ctrl-C.")
+@click.option(
+    "--log",
+    type=PATH,
+    help="Write the events to a file, one JSON object per line (- is standard output).",
+)
+@click.option(
+    "--for", "span", metavar="TIME", help="End after this time, such as 10s.  [at Ctrl-C]"
+)
 @click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
-@click.option("--check", is_flag=True, help="Read FILE and its EDS files, and end.")
-@click.option("--dot", is_flag=True, help="Draw FILE as a graph for Graphviz, and end.")
-@click.option("-q", "--quiet", is_flag=True, help="Do not tell the events on standard error.")
+@click.option("--check", is_flag=True, help="Check FILE and its EDS files, and exit.")
+@click.option("--dot", is_flag=True, help="Draw FILE as a graph for Graphviz, and exit.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the events to standard error.")
 @openrtm_options
 @ros2_options
 @version_option()
