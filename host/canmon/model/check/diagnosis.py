@@ -662,9 +662,14 @@ class _BusJudge:
                 begin, end = times[at], times[at + 1]
                 if not self._is_silent(ident, begin, end, period):
                     self._lost(ident, end - begin, says, piece[at : at + 2], n)
+            until = _next_beat_event(one, rows, piece[-1])
             if piece is pieces[-1] and self._end_us - times[-1] > _LOST_AFTER * period:
+                if until is not None and until.kind == "boot":
+                    says += (
+                        f"; boot-up after {ms_text(until.at_us - times[-1])} ms, none since then"
+                    )
                 self._lost(ident, self._end_us - times[-1], says, piece[-1:], 1)
-            elif len(times) > 2 and (until := _next_beat_event(one, rows, piece[-1])) is not None:
+            elif len(times) > 2 and until is not None:
                 gap_us = until.at_us - times[-1]
                 if gap_us > _LOST_AFTER * period and not self._is_silent(
                     ident, times[-1], until.at_us, period

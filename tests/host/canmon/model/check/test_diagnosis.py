@@ -242,6 +242,17 @@ def test_without_times_nothing_is_judged_by_them() -> None:
     assert "no-lost-heartbeat" in found.unjudged
 
 
+def test_a_node_that_boots_and_sends_no_heartbeat_any_more_is_one_finding() -> None:
+    beats = lines("701#7F " * 10 + "080#", 100_000)
+    after = [record._replace(at_us=1_700_000) for record in lines("701#00")]
+    end = [record._replace(at_us=3_000_000) for record in lines("080#")]
+    found = diagnose([beats + after + end])
+    (fault,) = [fault for fault in found.faults if fault.rule == "no-lost-heartbeat"]
+    said, _, boot = fault.text.partition("; ")
+    assert said == "no heartbeat for 2100.0 ms, one each 100.000 before"
+    assert boot == "boot-up after 800.000 ms, none since then"
+
+
 @pytest.mark.parametrize(("step_us", "judged"), [(99_999, False), (100_000, True)])
 def test_the_load_of_a_short_log_is_not_judged(step_us: int, judged: bool) -> None:
     found = diagnose([lines("701#00 701#7F 701#7F 701#7F 701#7F 701#7F", step_us)], 125_000)
