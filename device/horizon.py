@@ -9,16 +9,15 @@ from tickrig.device.twin import Part
 
 @dataclass
 class Horizon(Part):
-    """Limit up to which the devices of a rig may compute their ticks ahead.
+    """Time up to which the devices of a rig may compute their ticks ahead.
 
     A rig shares the object with its devices that have an attribute `horizon`.
 
     Attributes:
         passed_us: time up to which all ticks are done.
         until_us: time up to which a device may compute its ticks ahead. Before this time, the rig
-            only exchanges frames with the device and does not read its state. The only exception is
-            a scheduled action of the rig (an action of the event queue). It may read the state
-            between two ticks.
+            exchanges frames with the device, but does not read its state. Only a scheduled action
+            of the rig (an action of the event queue) may read the state between two ticks.
     """
 
     passed_us: int = 0

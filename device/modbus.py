@@ -107,11 +107,12 @@ class Registers(Part):
             values: values of the registers, 16 bits each.
 
         Returns:
-            The numbers that were written, by their names.
+            The numbers that were written, by their names. A number has one or two registers.
 
         Raises:
-            Refusal: a register does not exist or is read-only, only half of a number would be
-                written, or the value of a number is out of range.
+            Refusal: a register does not exist or is read-only, or the value of a number is out of
+                range. It is also raised if a number has two registers, and only one of them would
+                be written.
         """
         written: dict[str, int] = {}
         at = first

@@ -51,7 +51,7 @@ class Marker(Immutable):
     Attributes:
         ucode: ucode of 128 bits, as 32 hex digits in capitals.
         x_m: position in x, in metres.
-        y_m: position in y, which is to the left of x, in metres.
+        y_m: position in y, in metres. The y axis points to the left if you look along the x axis.
 
     Raises:
         ValueError: the ucode or the position is invalid.

@@ -504,15 +504,18 @@ class CanopenSlave(Copyable):
                 service.bus_state(state)
 
     def overrun(self) -> None:
-        """Report by EMCY 8110h that the CAN controller has lost frames. The error ends at once."""
+        """Report that the CAN controller has lost frames.
+
+        The error 8110h is raised by an EMCY and cleared immediately afterwards.
+        """
         self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
         self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
     def schedule(self, slot: int, due_us: int) -> None:
-        """Request one call of the `tick` of a service, which is chosen by its slot.
+        """Request one call of the method `tick` of a service.
 
         Args:
-            slot: position of the service in the order in which services act in a tick.
+            slot: index of the service in the list `services`.
             due_us: time of the call, or `NEVER` for no call.
         """
         self.await_tick(self.services[slot], due_us)
@@ -718,13 +721,14 @@ class Application(Service):
     def without_power(self, now_us: int) -> int:
         """Simulate the device while it has no supply, for example the motor as it coasts.
 
-        The method is called in the first tick without power, and when a physical input was set.
+        The method is called in the first tick without power, and after a physical input was set. It
+        is also called at the time that it has returned.
 
         Args:
             now_us: time of the tick.
 
         Returns:
-            The time of the next call, or `NEVER` if nothing changes by itself.
+            The time of the next call, or `NEVER` if the state changes only by a physical input.
         """
         return NEVER
 

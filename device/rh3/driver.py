@@ -219,13 +219,13 @@ class Driver(Part):
             self._waiting.append((self.now_us + self._delay_us, values))
 
     def step(self, last_request_us: int, until_us: int) -> _Pair:
-        """Run both wheels for one millisecond, and for the next ones as long as nothing changes.
+        """Run both wheels for one millisecond, or for several if nothing changes between them.
 
         Args:
             last_request_us: time of the latest request of the master.
-            until_us: time up to which milliseconds may be run. If the call runs several
-                milliseconds, the attribute `now_us` of this object becomes the time of the last of
-                them.
+            until_us: time of the last millisecond that the call may run. If the call runs several
+                milliseconds, it sets the attribute `now_us` of this object to the time of the last
+                one.
 
         Returns:
             The speeds of the left and the right wheel in each millisecond, in counts/ms.

@@ -104,10 +104,10 @@ class Gearbox:
             mode: reverse mode 0 to 3, which determines the movement when the stick is pulled back
                 (see `Gearbox`). Parameter #7 of the command `joystick` or the buttons set this
                 mode.
-            stick: translation and rotation of the stick as received. The angle of the stick
+            stick: translation and rotation of the stick, before `shape`. The angle of the stick
                 determines the gear.
-            shaped: the same translation and rotation after `shape`. The result is computed from
-                these values (DECISION R18).
+            shaped: translation and rotation of the stick, after `shape`. The result is computed
+                from them (DECISION R18).
             knobs: parameters of the command `joystick`. This method uses #8 to #10: the neutral
                 radius, and the angles `switch_deg` and `fade_deg`.
         """
@@ -211,10 +211,10 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits of a `limit` command, with their signs.
 
     First translation and rotation are each limited to their own limit. Then both are multiplied by
-    the same factor, so that the direction of travel stays the same. The command also has limits for
-    the sum of both values, for their product, and for the root of the sum of their squares. The
-    factor is the largest one, at most 1, that keeps all three limits (RRC manual, `limit`). All
-    arithmetic is integer and rounds down (DECISION R19).
+    the same factor, so that the direction of travel stays the same. The command has three limits
+    for both values together: for their sum, for their product, and for the root of the sum of their
+    squares. The factor is the largest one, at most 1, with which these three limits are kept (RRC
+    manual, `limit`). All arithmetic is integer and rounds down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)
@@ -239,7 +239,7 @@ class Drive:
 
     Attributes:
         out_pct: translation and rotation of the latest tick, -100..100 %.
-        gearbox: gear, forward or backward, that the RRC imitates in reverse modes 2 and 3.
+        gearbox: forward gear or backward gear of reverse modes 2 and 3; see `Gearbox`.
         by_stick: whether the stick drives the motors.
     """
 

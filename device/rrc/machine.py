@@ -91,10 +91,10 @@ class ReceiveBuffer:
     Attributes:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
-        thrown_blocks: number of whole blocks of `size` bytes that were discarded after overflows.
-            Each block costs as much processing time as an overflow. After an
-            overflow, the discarded bytes are counted up to the end of the line. A rest of less than
-            `size` bytes is not counted.
+        thrown_blocks: number of blocks of `size` bytes that were discarded after overflows. For
+            each overflow, the bytes are counted that are discarded after it up to the end of the
+            line. Each full `size` bytes are one block. A block costs as much processing time as an
+            overflow.
     """
 
     size: int
@@ -267,7 +267,10 @@ class Rrc(Copyable):
         return 0 if self.state is RrcState.OFF else PACE_WITHOUT_VR2
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Run one period of the RRC, in the order of DECISION R28.
+        """Run one period of the RRC.
+
+        The order in a period is (DECISION R28): received bytes, buttons and faults, lines,
+        watchdog, motors, SA line, buzzer.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

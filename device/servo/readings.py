@@ -420,9 +420,10 @@ class Readings(ServoSettings):
 
     @property
     def gear_counts(self) -> int:
-        """Angle of the output shaft from its absolute encoder, in counts with all turns.
+        """Angle of the output shaft from its absolute encoder, in counts.
 
-        The value is 0 if the servo has no absolute encoder.
+        Full turns are included, so the angle is not limited to one turn. The value is 0 if the
+        servo has no absolute encoder.
         """
         return floor(self.shaft_deg / 360.0 * self.parameters.encoders.gear_counts_per_turn)
 

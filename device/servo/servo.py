@@ -280,7 +280,7 @@ class Servo(Readings):
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Demand a position, as for the next step of a position controller.
+        """Demand a position, which the position controller of the servo follows.
 
         The velocity loop also gets the demanded velocity and acceleration (feed-forward).
 

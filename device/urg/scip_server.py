@@ -150,7 +150,7 @@ class Stream:
     """A command of SCIP 2.0 that requests one or more scans.
 
     Attributes:
-        command: command as received, which is valid.
+        command: the received command. It was already checked and is valid.
         begins_us: time from which scans count for the command. A scan that ends earlier is not
             sent.
         left: number of remaining scans, or 0 for scans without end.

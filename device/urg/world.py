@@ -219,13 +219,13 @@ _Span = tuple[int, int]
 
 
 class Beams(Part):
-    """The laser beams of a scan from one position, evenly spaced to the left.
+    """The laser beams of a scan from one position, in the order from right to left.
 
     Args:
         x_m: position of the sensor in x, in metres.
         y_m: position of the sensor in y, in metres.
-        rays: directions of the beams as unit vectors. Each direction is `tau / turn` after the
-            previous one.
+        rays: directions of the beams as unit vectors. From each beam to the next, the direction
+            turns to the left by `tau / turn` radians.
         first_rad: direction of the first beam in radians. It may be more than one full turn, but at
             most 2e6 radians in each direction.
         turn: number of beams in a full turn. `rays` has at most this number.

@@ -142,7 +142,8 @@ class FaultOrder:
             now_us: present time.
 
         Returns:
-            The specification of the fault with its end.
+            The specification of the fault. Its attribute `to_us` contains the time at which the
+            fault ends.
         """
         self.due_us = max(now_us, self.spec.from_us)
         self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
@@ -296,8 +297,8 @@ class AssemblyFaults(Copyable):
             name: name of the fault in this rig.
 
         Returns:
-            The faults of the wire or the node that has the fault. The second value is the name of
-            the fault at this wire or node.
+            Two values. The first is the object that contains the faults of this wire or node. The
+            second is the name of the fault in this object.
 
         Raises:
             KeyError: no fault has this name.

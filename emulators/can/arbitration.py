@@ -98,11 +98,11 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Remove and return the nodes that send next, if some nodes are not allowed to send yet.
+        """Remove and return the nodes that send next.
 
-        Such a node waits although the bus is free. It takes part in the arbitration only if its
-        wait has ended at the start of the frame. The method `take` is faster, but it ignores these
-        waits.
+        Some nodes may have to wait although the bus is free. Such a node takes part in the
+        arbitration only if its wait has ended at the start of the frame. The method `take` is
+        faster, but it ignores these waits.
 
         Args:
             everybody: whether to choose all nodes that may send at the start of the frame. This is

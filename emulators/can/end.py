@@ -189,7 +189,8 @@ class CanEnd(EndFields):
         Args:
             at_us: time at which the frame ended.
             frame: the frame.
-            alone: tuple with only this frame, which all receivers share to save time.
+            alone: the same frame as a tuple with one element. To save time, all receivers store
+                this tuple, and none makes its own.
         """
         if not self._first:  # one of all ends' objects is touched, not six: 5 % of eight buses
             self._first, self.arrived_us = alone, at_us

@@ -18,9 +18,15 @@ from tickrig.wire.canopen.datatypes import DataType
 class DigitalObjects(NamedTuple):
     """Indices of the objects that contain one property of digital lines, such as their polarity.
 
-    CiA 401 has objects of several widths for the same lines: a sub-index contains one line, or 8,
-    16 or 32 lines. For single lines there are eight consecutive objects, each with at most 128
-    lines. `single` is the index of the first of these eight objects.
+    CiA 401 has several objects for the same lines. They differ in the number of lines that one
+    sub-index contains.
+
+    Attributes:
+        single: index of the first of eight consecutive objects. Each of these objects has at most
+            128 lines, and a sub-index contains one line.
+        by_8: index of the object whose sub-indices contain 8 lines each.
+        by_16: index of the object whose sub-indices contain 16 lines each.
+        by_32: index of the object whose sub-indices contain 32 lines each.
     """
 
     single: int
@@ -53,7 +59,9 @@ DEFAULT_TRIGGER: Final = 7
 
 
 class AnalogueObjects(NamedTuple):
-    """Indices of the objects that contain the values and scaling of analogue inputs or of outputs.
+    """Indices of the objects that contain the values and the scaling of analogue lines.
+
+    `ANALOGUE_INPUT` has the indices for inputs, and `ANALOGUE_OUTPUT` those for outputs.
 
     Attributes:
         integers: indices of the values of 8, 16 and 32 bit.

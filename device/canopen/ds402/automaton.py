@@ -210,8 +210,8 @@ class Bounds(Immutable):
         winding_dc: highest temperature of the winding, in 0.1 degC.
         winding_warning_dc: temperature of the winding from which the drive warns, in
             0.1 degC.
-        stall_us: time in us for which the motor may stand in two cases: a motion is demanded, or
-            the current of the motor is limited.
+        stall_us: time in us after which a motor that does not turn is a fault. The time counts
+            while a motion is demanded, or while the current of the motor is limited.
     """
 
     supply_mv: tuple[int, int] = (9_000, 36_000)

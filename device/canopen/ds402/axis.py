@@ -396,8 +396,8 @@ class Switches(Part):
     """The limit switches and the home switch of an axis, as the drive reads them.
 
     A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. The
-    negative limit switch belongs to the negative direction of the user, and the positive one to the
-    positive direction. The polarity 607Eh is already part of these directions.
+    negative limit switch belongs to the direction in which the position in user units decreases,
+    and the positive one to the direction in which it increases.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.

@@ -40,14 +40,14 @@ class Stretch(Part):
         self._bounds: Bounds
 
     def plan(self, now_us: int, *, requested: bool) -> int:
-        """Compute the ticks that follow the present tick, as long as they only continue the motion.
+        """Compute the ticks after the present tick in advance.
+
+        The computation ends before the first tick in which anything happens besides the motion.
 
         Args:
             now_us: time of the present tick.
             requested: whether a frame or an input caused the present tick. If false, the drive
-                itself had scheduled the tick. The interval between the last two requested ticks
-                limits the number of computed ticks, because the next request is expected after the
-                same interval.
+                itself had scheduled the tick.
 
         Returns:
             The duration of the computed ticks in microseconds, or 0 if none were computed.

@@ -268,6 +268,7 @@ class PathFollower(Part):
 def began_us(now_us: int) -> int:
     """Return the time at which a path that is planned in this tick begins, in microseconds.
 
-    It is the time of the previous tick, because the reference still has the values of that tick.
+    The result is the time of the previous tick. A path begins at the demanded position and velocity
+    of the drive, and these are still the values of the previous tick.
     """
     return now_us - TICK_US

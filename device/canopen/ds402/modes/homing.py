@@ -130,7 +130,7 @@ class HomingSearch(Part):
         return self.phase in (Phase.FOUND, Phase.FAILED)
 
     def step(self, switches: Switch, moving: int, *, crawling: bool, index: bool) -> None:
-        """Advance the search by one control step.
+        """Advance the search for the home position by one control step.
 
         Args:
             switches: switches that are active in this step.

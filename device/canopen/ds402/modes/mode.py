@@ -115,13 +115,14 @@ class Mode(Part):
         return self.halt(now_us)
 
     def ahead(self) -> Line | None:
-        """Return the demanded motion of the next steps for the case that no input changes.
+        """Return the demanded motion of the next steps, if it is known in advance.
 
-        A drive calls this method to compute several ticks at once.
+        A drive calls this method to compute several ticks at once. The result is valid as long as
+        no input changes.
 
         Returns:
-            The straight line on which the demanded positions are, or None if each step needs a
-            separate call of `step`.
+            The motion as a `Line`, which has a constant velocity up to a goal. The result is None
+            if the drive must call `step` for each step.
         """
         return None
 
