@@ -68,7 +68,7 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
     def read(self, value: str | float) -> Any:
         """Return the value of this field, converted from the value in a rig file.
 
-        The rules and error messages are those of the option on the command line.
+        The field is also an option of the command line. The rules and error messages are the same.
 
         Raises:
             ValueError: the value is out of range, or has a wrong type.
@@ -147,8 +147,8 @@ def check_needed(
     Args:
         fields: configuration fields of a device type.
         values: values of all fields by field name.
-        given: names of the fields for which the user has given a value. If this value is the
-            default, the field raises no error.
+        given: names of the fields for which the user has given a value. If the user has given the
+            default value of a field, this field raises no error.
     """
     known = {field.name: field for field in fields}
     for name, field in known.items():

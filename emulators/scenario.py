@@ -107,9 +107,10 @@ class ScenarioParser:
             `set`, `press` and `fault`.
         encoders: functions of additional verbs that send to the device, by name of the verb. The
             function gets the text after the verb in the scenario, and returns the bytes to send.
-        senders: functions of the verbs that send on a wire without text lines, by name of the verb.
-            If they are given, the scenario has these verbs instead of `send`, `raw` and the verbs
-            of `encoders`.
+        senders: functions of the verbs that send, for a wire that transports no text lines, such as
+            a CAN bus. The key is the name of the verb. Each function parses the text after its
+            verb. If they are given, the scenario has these verbs instead of `send`, `raw` and the
+            verbs of `encoders`.
     """
 
     def __init__(

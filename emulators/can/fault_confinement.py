@@ -99,12 +99,13 @@ class FaultConfinement(Part):
     """Updates the error counters and error states of all nodes of a bus.
 
     Args:
-        ends: all ends of the bus.
-        changed: function that is called with the time and the end whenever an error state changes.
+        ends: the connections of all nodes to the bus.
+        changed: function that is called whenever the error state of a node changes. Its arguments
+            are the time and the connection of the node.
 
     Attributes:
-        marked: ends with a counter that is not 0. While there are none, the bus need not count
-            frames without errors.
+        marked: connections of the nodes with an error counter that is not 0. While there are none,
+            the bus need not count frames without errors.
     """
 
     def __init__(self, ends: list[CanEnd], changed: Callable[[int, CanEnd], None]) -> None:
@@ -142,7 +143,7 @@ class FaultConfinement(Part):
 
         Args:
             at_us: time of the event.
-            end: end of the node.
+            end: connection of the node to the bus.
             event: method of `ErrorCounters` that counts the event.
         """
         controller = end.controller
@@ -208,13 +209,11 @@ class Recovery(Part):
         )
 
     def interrupt(self, at: int, until: int) -> None:
-        """Count the sequences of recessive bits before a frame on the bus.
-
-        The count continues after the frame, when the bus is recessive again.
+        """Count the sequences of recessive bits up to the start of a frame on the bus.
 
         Args:
-            at: time of the first dominant bit.
-            until: time from which the bus is recessive again.
+            at: time of the first dominant bit of the frame.
+            until: time at which the bus is recessive again. The count continues at this time.
         """
         for number, (end, left, since) in self._waiting.items():
             seen = max(0, at - since) // self._sequence

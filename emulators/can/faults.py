@@ -162,7 +162,8 @@ class CanFaults(Copyable):
         The decision for this frame stays the same until `spend` is called.
 
         Args:
-            senders: numbers of the ends that send the frame.
+            senders: the nodes that send the frame, each as the number of its connection
+                (`CanEnd.number`).
 
         Returns:
             What happens to the frame.

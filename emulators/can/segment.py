@@ -222,7 +222,7 @@ class CanSegment(TransmissionOutcomes):
         If the node is sending a frame, the frame is aborted.
 
         Args:
-            end: end of the node.
+            end: connection of the node to the bus.
             now_us: present time.
         """
         self.disturb(now_us)

@@ -70,14 +70,14 @@ class CanWire(Copyable):
         self._babbler: CanEnd | None = None
 
     def end(self, accepts: Accepted = None) -> CanEnd:
-        """Connect another node to the bus.
+        """Connect another node to the bus, and return its connection.
 
         Args:
             accepts: CAN-IDs that the node receives, or None for all. A 29-bit CAN-ID has bit 29
                 set.
 
         Returns:
-            The end of the bus for this node, which is its port in a `Station`.
+            The connection of the node to the bus. A `Station` needs it as the port of the node.
         """
         end = CanEnd(self, self._count, accepts)
         self._count += 1
@@ -140,7 +140,7 @@ class CanWire(Copyable):
         """Unplug a node from the bus. Its frames are then neither received nor acknowledged.
 
         Args:
-            end: the node's end.
+            end: connection of the node to the bus.
         """
         if end.number not in self._apart:
             now_us = self.bus.now_us
@@ -155,7 +155,7 @@ class CanWire(Copyable):
         """Plug a node in again.
 
         Args:
-            end: the node's end.
+            end: connection of the node to the bus.
         """
         apart = self._apart.pop(end.number, None)
         if apart is not None:
@@ -167,7 +167,7 @@ class CanWire(Copyable):
         """Cut the power of a node: its waiting frames are lost, and its CAN controller is reset.
 
         Args:
-            end: the node's end.
+            end: connection of the node to the bus.
         """
         self.disconnect(end)
         apart, now_us = self._apart[end.number], self.bus.now_us
@@ -181,7 +181,7 @@ class CanWire(Copyable):
         """Force a node bus-off until `release`.
 
         Args:
-            end: the node's end.
+            end: connection of the node to the bus.
         """
         end.auto_recovery = False
         end.segment.force_off(end, self.bus.now_us)
@@ -192,7 +192,7 @@ class CanWire(Copyable):
         From then on the node recovers from bus-off automatically, as with most drivers.
 
         Args:
-            end: the node's end.
+            end: connection of the node to the bus.
         """
         end.auto_recovery = True
         end.recover(self.bus.now_us)

@@ -368,7 +368,8 @@ class EdsCache:
 
         Args:
             path: path of the file.
-            profile: profile for missing defaults, or None to describe the device by its file alone.
+            profile: name of a device profile, which supplies the default values that are missing in
+                the file. None means that only the file describes the device.
 
         Raises:
             OSError: the file cannot be read.

@@ -555,8 +555,8 @@ class NodeFaults(Copyable):
 
     Args:
         node: the node.
-        wire: bus of the node, which supplies the random numbers. Faults of the bus are armed so
-            that they hit only frames of the node.
+        wire: bus of the node. It supplies the random numbers for the faults. Some of the faults are
+            faults of this bus that hit only frames of the node.
 
     Attributes:
         station: the station of the node, as soon as the node has one.
@@ -644,7 +644,7 @@ class NodeFaults(Copyable):
 
     @property
     def due_us(self) -> int:
-        """Time of the next event: a fault acts by itself, or a delayed frame is sent."""
+        """Time at which a periodic fault acts next, or a delayed frame is sent."""
         due_us = self._held[0][0] if self._held else NEVER
         return min([due_us, *(armed.next_us for armed in self._armed.values())])
 
@@ -695,7 +695,8 @@ class NodeFaults(Copyable):
             received: frames that have arrived.
 
         Returns:
-            The frames that the node receives, and frames that the faults send in addition.
+            Two sequences: the frames that the node receives, and the frames that the faults send on
+            the bus.
         """
         self._now_us = now_us
         if not self.node.is_on:

@@ -304,11 +304,11 @@ class NodeSide:
 
 
 def side_of(nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> Assembly:
-    """Return one object with the inputs and outputs of all nodes of a bus, and of robot bodies.
+    """Return one object with all inputs and outputs of the nodes of a bus and of robot bodies.
 
     If there is only one node, its signals have their plain names: `0x6000:1`, `state`. With several
     nodes the name of the node is a prefix: `5/0x6000:1`, `5/state`. The name of a body is a prefix
-    as well, as in `body/x_m`, unless the body is the only part.
+    as well, as in `body/x_m`. Without nodes, the signals of a single body have no prefix.
     """
     plain = nodes[0].name if len(nodes) == 1 else None
     return Assembly({part.name: NodeSide(part) for part in (*nodes, *bodies)}, plain)

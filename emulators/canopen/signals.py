@@ -197,9 +197,9 @@ _COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
 
 class SwitchSignal:
-    """Signal for a physical fault that every node has, such as a power cut; its value is 0 or 1.
+    """Signal that starts (1) or ends (0) a physical fault of a node, such as a power cut.
 
-    See `NodeSignal`.
+    Every node has these signals. See `NodeSignal`.
 
     Args:
         name: name of the fault.

@@ -156,7 +156,8 @@ class ConfiguredDevice:
 
     Attributes:
         type: type of the device. Options of the command line can change the type. For example, the
-            option `--node` of an RTC-Lite node changes its title and its verbs.
+            option `--node` of an RTC-Lite node changes the title of the type and the verbs for
+            scenarios.
         device: the device.
         config: all settings of the device, which a trace records.
     """

@@ -257,14 +257,17 @@ class Moment:
 
 
 def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:
-    """Run the T-Kernel demonstration: drive with the ucode service, then back without it.
+    """Run the T-Kernel demonstration.
+
+    The cart drives along the corridor with the ucode service. Then it drives back without the
+    service.
 
     Args:
         stage: cart, board and service, which have not run yet.
         echo: function that is called with each line of the progress report.
 
     Returns:
-        The position errors every 100 ms, from the first step on.
+        The position errors of both drives, one for every 100 ms.
     """
     moments: list[Moment] = []
     stage.loop.activate("tuned")

@@ -83,14 +83,13 @@ class FrameFormat(Immutable):
     answer: FrameFields | None = None
 
     def described(self, request: FrameFields, answer: FrameFields | None = None) -> FrameFormat:
-        """Return a copy of this frame format; a log with the copy shows the fields of frames.
+        """Return a copy of this frame format that splits frames into fields for a log.
 
         Args:
             request: function that gets a frame of the host, and returns its fields by name. The
                 function raises an exception for an invalid frame. An object whose method `parse`
                 does this is accepted, too, for example a Struct of the library construct.
-            answer: function or object that does this for a frame of the device. The default is
-                `request`.
+            answer: the same for the frames of the device. The default is `request`.
         """
         return replace(self, request=request, answer=answer or request)
 

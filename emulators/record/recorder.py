@@ -249,10 +249,10 @@ _BUS_STATE = {state: text for text, state in BUS_STATE.items()}
 
 
 class Tick(NamedTuple):
-    """Everything that a recording has about one device in one tick, or about a wire between ticks.
+    """The part of a recording about one device in one tick, or about a wire at one time.
 
     Attributes:
-        at_us: time of the tick in microseconds.
+        at_us: time of the tick or of the action on the wire, in microseconds.
         name: name of the device or wire.
         done: actions before the tick, such as `stick=5`.
         received: bytes or frames that the device received.

@@ -120,12 +120,12 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return the incomplete line or frame of each direction, as an entry with the number 0.
+        """Return the latest line or frame of each direction if it has not ended; its number is 0.
 
         Args:
-            by_gap: kind of the entries. True selects the frames that only a silence can end.
-                Such a frame may already be complete. False selects the lines, and the frames whose
-                end is known from their bytes.
+            by_gap: kind of the entries. True selects the frames that only a silence can end. All
+                bytes of such a frame may be there, but the silence has not ended it yet. False
+                selects the lines, and the frames whose end is known from their bytes.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

@@ -634,7 +634,10 @@ class FaultyPort(Copyable, Generic[W]):
                 fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the UART setting of the device, after the faults have released held traffic.
+        """Change the UART setting of the device.
+
+        If a fault holds back traffic of the device, the change happens after this traffic has been
+        released. The method does not wait for this.
 
         Args:
             now_us: present time in microseconds.

@@ -46,9 +46,10 @@ def enable(wanted: bool) -> bool:
 
 
 def bits(frame: object) -> int | None:
-    """Return the length of a CAN frame in bits, or None if the kernel cannot read the frame.
+    """Return the length of a CAN frame in bits, as the compiled kernel counts it.
 
-    If the result is None, the caller counts the bits with Python code.
+    The result is None if the kernel does not support the frame. The caller then counts the bits
+    with Python code.
     """
     counted: int | None = _KERNEL.frame_bits(frame)
     return counted
@@ -109,8 +110,8 @@ if TYPE_CHECKING or _KERNEL is None:
             parts: the parts of the rig that the kernel uses: timetable, bus, event queue,
                 `Horizon`, watchers, hosts, and the devices at their ports (stations).
             until_us: end of the run, in microseconds.
-            unseen_us: time in microseconds. Before this time probably no code reads a device, so a
-                device may compute several ticks in advance.
+            unseen_us: time in microseconds up to which no code is expected to read a device. Up to
+                this time a device may compute several ticks in advance.
             host: end of a wire at which a host waits for traffic, or None if no host waits.
 
         Returns:

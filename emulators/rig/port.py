@@ -12,7 +12,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class Port(Protocol[W]):
-    """Protocol of one end of a wire, at which a device or host sends and receives.
+    """Interface of one end of a wire, at which a device or host sends and receives.
 
     A port never blocks. Its methods get the present time as an argument.
     """
@@ -81,9 +81,9 @@ class ByteEnd(Port[bytes], Protocol):
     def arrival_us(self, count: int) -> int:
         """Return the time at which to check whether `count` bytes have arrived at this end.
 
-        If the arrival time is known, the result is this time. Otherwise the result may be an
-        earlier time, or `NEVER`. If bytes are missing at the returned time, the caller calls this
-        method again.
+        If the arrival time is known, the result is this time. Otherwise it is an earlier time, and
+        the caller checks at this time and calls the method again. If no bytes are in transit, the
+        result may be `NEVER`.
         """
         ...
 

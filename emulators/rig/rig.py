@@ -67,11 +67,11 @@ from tickrig.wire.instant import NEVER, next_tick_us
 
 
 class Coupling(Protocol):
-    """Protocol of a mechanical connection of devices, such as a belt between two shafts.
+    """Interface of a mechanical connection of devices, such as a belt between two shafts.
 
-    A coupling acts after all devices of a step have computed. It reads the outputs of devices and
-    may set inputs of devices. The inputs take effect in the next tick. Therefore the result does
-    not depend on the order of the devices.
+    In each step of the rig, the devices compute first, and then the coupling acts. It reads outputs
+    of devices, and may set inputs of devices. The inputs take effect in the next tick. Therefore
+    the result does not depend on the order of the devices.
     """
 
     @property
@@ -433,9 +433,9 @@ class Rig(Copyable):
         Args:
             t_us: end of the run, in microseconds since the start of the rig.
             host: host whose traffic ends the run early, or None to run to the end.
-            unseen_us: hint that makes the run faster: for this time after `t_us`, in microseconds,
-                the caller will probably not read devices or set inputs between ticks. If the caller
-                does so, the result is right, too.
+            unseen_us: duration in microseconds after `t_us` in which the caller does not expect to
+                read devices or to set inputs between ticks. The run is then faster. The result is
+                also right if the caller does so.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):

@@ -60,8 +60,8 @@ class SimLink:
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: the method was called too many times with 0 at the same time of the rig, so
-                that the host would wait endlessly.
+            LinkError: the method was called too many times with the time-out 0 while the time of
+                the rig did not advance. Without this error, the host would wait endlessly.
         """
         self._check_open()
         rig = self._rig

@@ -17,7 +17,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class WirePort(Protocol[W]):
-    """Protocol of a `Port` that reports the arrival of traffic, so the rig need not poll it."""
+    """Interface of a `Port` that reports the arrival of traffic, so the rig need not poll it."""
 
     # Not derived from `Port`: a compiled base class has additional names, which would become
     # members of the protocol.
@@ -37,7 +37,7 @@ def is_wire_port(port: object) -> TypeGuard[WirePort[Any]]:
 
 
 class Station(StationFields, Generic[W]):
-    """A device at its port, as a rig runs it.
+    """A device together with its port. A rig consists of stations and calls their devices.
 
     Attributes:
         at_us: time of the next tick in which the rig calls the device, in microseconds.

@@ -58,7 +58,8 @@ class CanHost:
 
     Args:
         rig: the rig to advance.
-        end: end of a bus of the rig, without a station.
+        end: connection of the host to a bus of the rig, made by `CanWire.end`. No device of the rig
+            uses this connection.
         thread: thread that uses the link. None means the thread that makes the link.
         hears_own: whether the host also receives its own frames, after they have been on the bus.
     """

@@ -48,9 +48,9 @@ def retime(target: object, names: _Names, library: str) -> None:
 
 
 def retimed(cls: type, names: _Names, library: str) -> type:
-    """Return a subclass in whose methods global names, such as a clock, are replaced.
+    """Return a subclass of `cls` whose methods use other global names, such as another clock.
 
-    If no method uses one of the names, return the class itself. See `retime`.
+    If no method of `cls` uses one of the names, return `cls` itself. See `retime`.
     """
     members = {
         name: copied

@@ -115,7 +115,7 @@ class _WaitLimit(HostLimit):
         Args:
             now_us: present time in microseconds.
             where: function that returns file and line number of the waiting code, for the message.
-                With None the message names the line of the host's code that waits.
+                If it is None, this code is found in the call stack.
 
         Raises:
             HostHangsError: the limit is reached.
