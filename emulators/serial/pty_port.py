@@ -259,9 +259,9 @@ class PtyPort(NonCopyable):
         The bytes are not changed, because a pty transmits without a bit rate.
 
         Args:
-            setting: new setting of the device. A host's setting of a pty always reads as 8 data
-                bits, and even parity reads as no parity. The new setting is compared in the same
-                form.
+            setting: new setting of the device. A pty does not show the data bits that a host has
+                selected, and shows no parity for a host that has selected even parity. Therefore
+                the data bits are not compared, and even parity is treated as no parity.
         """
         if self._setting is not None:
             parity = "O" if setting.parity == "O" else "N"

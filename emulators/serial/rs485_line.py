@@ -93,16 +93,14 @@ class Rs485Line(Copyable):
     def put(self, sender: Rs485End, now_us: int, start_us: int, data: bytes) -> int:
         """Send bytes of a station on the RS485 line, without gaps between them.
 
-        The ends of the line call this method.
-
         Args:
-            sender: end that sends the bytes.
+            sender: the station's `Rs485End`.
             now_us: present time in microseconds.
             start_us: start of the first byte.
             data: bytes to send.
 
         Returns:
-            The time at which the last byte has passed, in microseconds.
+            The time in microseconds at which the last byte is complete.
         """
         # A burst is cut at whole microseconds once, at its end; single bytes are worked out
         # from its start.
@@ -120,14 +118,15 @@ class Rs485Line(Copyable):
         return end_us
 
     def cut(self, sender: Rs485End, now_us: int) -> int:
-        """Discard the bytes that a station has still to send, except the byte in transmission.
+        """Discard the bytes that a station has queued, except the byte that it is just sending.
 
         Args:
-            sender: end of the station.
+            sender: the station's `Rs485End`.
             now_us: present time in microseconds.
 
         Returns:
-            The time at which the byte in transit has passed, in microseconds.
+            The time in microseconds at which the byte that is just being sent is complete, or
+            `now_us` if the station sends no byte.
         """
         end_us = now_us
         for burst in self._air:
@@ -249,7 +248,7 @@ class Rs485End:
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte of this end will have been sent.
+        """Time in microseconds at which the station has sent its last byte completely.
 
         If all bytes have been sent, the time is in the past.
         """

@@ -51,7 +51,8 @@ class ResolutionService:
 
     Attributes:
         table: ucodes and contents, which may be changed.
-        inputs: faults of the service, as inputs.
+        inputs: inputs that switch faults of the service on and off, such as `unreachable`, and the
+            input `delay_ms`.
     """
 
     tick_us: Final = 1_000

@@ -68,8 +68,9 @@ class _SimPort(SerialBase):
         """Open the port, switch DTR and RTS on, and discard earlier input.
 
         Raises:
-            SerialException: the port is already open, another port is open on the line, or the
-                setting is refused.
+            SerialException: the port is already open, or another port is open on the line. It is
+                also raised if the bit rate or frame differs from that of the device and `mismatch`
+                is `refuse`.
         """
         if self.is_open:
             raise SerialException("Port is already open.")
@@ -260,11 +261,14 @@ class SimSerial(_SimPort):
         self.open()
 
     def open(self) -> None:
-        """Open the port, on the line of its rig or on the line that a `tickrig://` URL names.
+        """Open the port. If `port` is a `tickrig://` URL, the URL names the line.
+
+        Otherwise the port opens on the line with which this object was made.
 
         Raises:
-            SerialException: no rig offers the name in the URL, the port is already open, another
-                port is open on the line, or the setting is refused.
+            SerialException: no rig offers the name in the URL, the port is already open, or another
+                port is open on the line. It is also raised if the bit rate or frame differs from
+                that of the device and `mismatch` is `refuse`.
         """
         own_name, own_side = self._own
         if not self.is_open and self.port is not None:

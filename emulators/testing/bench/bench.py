@@ -465,8 +465,8 @@ class Bench(BenchDevice, Closing):
         Args:
             done: function that returns whether the condition is true, such as `on_line("OK:beep")`.
                 The function must have no side effects.
-            within: longest wait. The default is one day in virtual time, otherwise there is no
-                limit.
+            within: longest wait. Without this argument the wait ends after one day in virtual time,
+                and has no limit in real time.
 
         Returns:
             True if the condition is true, or False after the time-out.
@@ -478,8 +478,8 @@ class Bench(BenchDevice, Closing):
 
         Args:
             name: name of the input or output.
-            within: longest wait. The default is one day in virtual time, otherwise there is no
-                limit.
+            within: longest wait. Without this argument the wait ends after one day in virtual time,
+                and has no limit in real time.
 
         Returns:
             The new value, or the unchanged value after the time-out.

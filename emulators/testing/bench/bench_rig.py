@@ -96,8 +96,8 @@ class Journal(WireLog):
 
         Args:
             source: name of the line or node.
-            ends: two names for the text of an entry, such as `host` and `device`. The second name
-                is for the device or node, the first name is for the other side of its wire.
+            ends: names of the two sides of the wire, such as `host` and `device`, for the text of
+                an entry. The second name is that of the device or node.
             splitter: splitter of the line into entries of the journal. The bytes of a line without
                 a delimiter are shown in hex.
         """
@@ -265,7 +265,8 @@ class Parts:
         signals: values that change with time. The key `DEVICE/INPUT` is an input, whose value the
             signal sets. Any other key is a name, under which other signals use the value in their
             formulas.
-        stores: files with stored parameters of nodes, which are saved while time passes.
+        stores: files for the parameters that nodes store. A file is written when a node stores
+            something.
         seed: seed of all random numbers.
     """
 

@@ -201,7 +201,8 @@ def rig_of(
     Args:
         parts: the devices on their wires.
         plan: content of the rig file, for its faults.
-        outside: connections for hosts in real time, or None for virtual time.
+        outside: connections to the hosts if the bench runs in real time, or None if it runs in
+            virtual time.
         trace: path of the recording, or None for no file.
         keeps: whether to record the run in memory if there is no file.
 
@@ -251,7 +252,9 @@ def mounts_of(
     line: LineSettings | None = None,
     sdo_timeout_us: int | None = None,
 ) -> list[Mount]:
-    """Make the devices of a bench, and a line for each serial device or one CAN bus for all nodes.
+    """Make the devices and wires of a bench.
+
+    Each serial device gets its own line. All CANopen nodes are on one CAN bus.
 
     Args:
         devices: devices, device types or names of device types, by name of the device.

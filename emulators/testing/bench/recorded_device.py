@@ -29,9 +29,10 @@ def node_entry(
     profile: str = AUTO,
     files: Iterable[Path] = (),
 ) -> DeviceEntry:
-    """Return the description of a CANopen slave for the header of a trace, before its first tick.
+    """Return the description of a CANopen slave for the header of a trace.
 
-    A replay makes the slave from this description.
+    A replay makes the slave from this description. Call this function before the first tick of the
+    slave.
 
     Args:
         wire: name of the bus.
@@ -72,7 +73,7 @@ def make_recorded(
     Args:
         header: header of the trace.
         name: name of the device in the header.
-        folder: folder of the trace, in which the files are searched that the trace names.
+        folder: folder of the trace. Files that the trace names are searched in this folder.
         cache: cache of EDS files.
         run_code: whether a Python file that the trace names may be run.
 

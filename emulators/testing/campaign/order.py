@@ -73,7 +73,7 @@ class Collected(NamedTuple):
 
     Attributes:
         tests: tests that use a bench.
-        left_out: node IDs of tests without a bench, which the campaign does not run.
+        left_out: tests that use no bench, as pytest's node IDs. The campaign does not run them.
         digest: hash of the files of the tests, and of the project's modules that these files
             import.
     """

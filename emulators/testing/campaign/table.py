@@ -232,9 +232,10 @@ def _seeds(rows: Sequence[CampaignRow]) -> str:
 
 
 def missing_seeds(table: CampaignTable) -> Iterator[str]:
-    """Yield a message for each test of a campaign whose seeds have gaps.
+    """Yield a message for each test that was not run with some of the seeds of its range.
 
-    There are gaps if the table of a part of the campaign was not merged.
+    The range is from the smallest to the largest seed of the test in `table`. Seeds are missing,
+    for example, if the campaign ran in several shards and the table of one shard was not merged.
     """
     tests: dict[str, list[int]] = {}
     for row in table.rows:

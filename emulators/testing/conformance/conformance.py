@@ -128,8 +128,8 @@ class SlaveBench:
     Args:
         slave: the slave under test.
         bit_rate: bit rate of the bus, 10 000 to 1 000 000 bit/s.
-        stimulus: function that sets the inputs of the slave. The function is not called with
-            `power`, because the bench switches the supply itself.
+        stimulus: function that sets the inputs of the slave. The bench switches the supply
+            (`power`) itself, without this function.
 
     Attributes:
         source: the open bus with the slave, for the conformance tester.

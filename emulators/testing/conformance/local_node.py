@@ -21,7 +21,8 @@ class LocalNodeSlave:
     """A `canopen.LocalNode` as a slave for the conformance tester, with virtual network and timers.
 
     The node boots as in the library's documentation (`nmt.send_command(0)`, then Pre-operational).
-    Other work of an application is not done, such as restoring values at a reset or sending TPDOs.
+    This class does no other work of an application. For example, it does not restore values at a
+    reset, and sends no TPDOs.
 
     Args:
         make: function that makes the node with its dictionary. It is called again at each power-on.

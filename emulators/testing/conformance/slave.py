@@ -19,11 +19,10 @@ TICK_US: Final = 1_000
 
 
 class Slave(Protocol):
-    """Protocol of a CANopen slave under test: `tick` gets the time and frames, and returns frames.
+    """Interface of a CANopen slave under test: `tick` gets the time and frames, and returns frames.
 
     The slaves of `tickrig.device` have this interface. To test your own slave, write a class with
-    this interface. The class gets the time as an argument and reports when it must be called next,
-    and it may wrap a C library.
+    this interface. The class may wrap a C library.
     """
 
     @property
@@ -86,8 +85,8 @@ class CalledSlave:
     """A slave for the conformance tester, made from a function that is called each millisecond.
 
     Args:
-        make: function without arguments. It returns the function that is called each millisecond,
-            in its state after power-on. `make` is called again at each power-on.
+        make: function without arguments. It returns the function that is called each millisecond.
+            `make` is called again at each power-on, and the slave then starts in its initial state.
 
     Raises:
         ValueError: `make` does not return such a function.

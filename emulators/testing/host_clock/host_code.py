@@ -35,7 +35,7 @@ class UnpatchedTimeError(HostTimeError):
 
 
 class HostHangsError(AssertionError):
-    """Raised if a host does not return, because it waits longer than the bench allows.
+    """Raised if a host waits longer than the limit of the bench, for example in an endless loop.
 
     In a search for failures, the class `BenchMachine` sets this limit.
     """

@@ -85,7 +85,7 @@ class HostStep:
         return f"+{_time(self.wait_us)} {self.verb} {what}".rstrip() + lasting
 
     def do(self, bench: Bench) -> None:
-        """Wait for the pause of this step, then execute its action on a bench.
+        """Let the pause of this step pass on a bench, then execute its action there.
 
         A step with the verb `call` calls a method of a `BenchMachine`. This function cannot execute
         such a step, because it has only the bench.
@@ -121,13 +121,14 @@ class HostStep:
 def parse_steps(
     text: str, file: str, rules: Mapping[str, Mapping[str, object]] | None = None
 ) -> tuple[HostStep, ...]:
-    """Parse a scenario of a search into its steps.
+    """Parse a scenario of a search for failures of a host into its steps.
 
     Args:
         text: content of the scenario file.
         file: name of the file, for error messages.
-        rules: rules of the machine with their arguments. An argument may be any value that its rule
-            lists.
+        rules: arguments of the methods that a `BenchMachine` marks by `host_rule`, by name of the
+            method. If an argument has a list of possible values, a step may use each of these
+            values.
 
     Raises:
         ValueError: a line is invalid. The message is `FILE:LINE: found text, what is allowed`.

@@ -54,7 +54,9 @@ def timing() -> st.SearchStrategy[int]:
 def faults(
     bench: Bench, names: Sequence[str] | None = None, for_: Sequence[str] = ("100ms", "1s")
 ) -> st.SearchStrategy[HostStep]:
-    """Return a Hypothesis strategy for temporary faults; `step.do(bench)` starts the drawn fault.
+    """Return a Hypothesis strategy for temporary faults.
+
+    The strategy draws a `HostStep`. The method `do` of the step starts the fault on a bench.
 
     Args:
         bench: the bench with the faults.

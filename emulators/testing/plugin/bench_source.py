@@ -88,9 +88,9 @@ class WantedBench(NamedTuple):
     limit: str | None = None
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return a copy of this request with devices for one test, to open the bench of the test.
+        """Return a copy of this request, in which `source` has new devices for one test.
 
-        Relative paths of the files of devices start from `folder`.
+        If `source` is a function, it is called. Relative paths of files start from `folder`.
 
         Args:
             item: the test.
@@ -232,7 +232,7 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names that a test gives to its markers `needs`, in their order.
+    """Return the arguments of all markers `needs` of a test, in their order.
 
     Raises:
         ValueError: a name is unknown.

@@ -111,7 +111,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 def last_lines(bench: Bench, count: int) -> str:
     """Return the last events on a bench as lines of text with time, wire, direction and content.
 
-    Lines that were not complete at the end come last.
+    An incomplete line of text on a serial line comes after all other events.
     """
     described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]

@@ -66,11 +66,11 @@ def blocked(
 
 
 def is_mistake(error: BaseException) -> bool:
-    """Return whether an error is a mistake in the test, which would occur on a fast machine, too.
+    """Return whether an error is a mistake in the test, so that a faster machine would not help.
 
-    A misspelt name is such a mistake, and so is a call that the bench refuses. If the test fails
-    because a value is None, this is not a mistake: a message may not have arrived in time. An
-    exception that the host itself raises is not a mistake either.
+    Examples are a misspelt name, and a call that the bench refuses. An error because a value is
+    None is no mistake: on a slow machine, a message may not have arrived in time. An exception that
+    the host itself raises is no mistake either.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))
@@ -94,12 +94,11 @@ def _raiser(error: BaseException) -> str:
 
 
 def end_at_caller(error: BaseException) -> None:
-    """Remove the frames of tickrig from a traceback, so that users see their own line last.
+    """Remove stack frames of tickrig from a traceback, so that users see their own line last.
 
-    If tickrig refused a call, or if a host waits endlessly, the traceback ends at the line in the
-    test or in the host that called tickrig. If tickrig called a function of the test, such as a
-    condition, and this function raised, the traceback ends in this function, and the frames of
-    tickrig before it are removed.
+    If tickrig refused a call, or a host waits endlessly, the last line is the line of the test or
+    host that called tickrig. If tickrig called a function of the test, such as a condition, and
+    this function raised the exception, the last line is in this function.
 
     Args:
         error: the exception of the test.

@@ -286,7 +286,10 @@ _KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True
 
 
 class DeviceChecks:
-    """Property-based checks of one device type, on which a host and the environment act.
+    """Property-based checks of one device type.
+
+    In each check, a session of actions is played: a host sends data, inputs of the device change,
+    or the device is reset.
 
     Args:
         bench: function that makes a bench with one device.

@@ -28,7 +28,7 @@ def must(holds: bool, text: str) -> None:
 
 
 def check_members(device: Any, nothing: Any) -> None:
-    """Check that an object has the attributes of every device, and a valid period.
+    """Check that an object has the attributes that every device must have, and a valid period.
 
     Args:
         device: the device, which is not changed.

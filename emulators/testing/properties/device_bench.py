@@ -28,16 +28,17 @@ Observation = tuple[Any, ...]
 
 @dataclass
 class DeviceBench:
-    """A device on a wire with a host that plays a session, for the property-based checks.
+    """A device on a wire, with a host, for the property-based checks.
 
     The object records all data that the host receives, and all changes of the device's outputs.
 
     Attributes:
         make: function that makes the device.
         wire: function that makes the wire.
-        start: actions before the session.
+        start: actions that are executed once, when the bench is made.
         dense: whether the rig calls the device in every tick, not only when it is due.
-        pieces: whether the host writes byte by byte, or frame by frame.
+        pieces: whether the host writes single bytes or frames. If false, it writes all bytes or
+            frames of an action at once.
         trace: file in which the device is recorded, or None to record nothing.
     """
 

@@ -277,8 +277,9 @@ def thinned(points: Sequence[Point], most: int) -> list[Point]:
     """Return a curve with at most `most` samples, which keeps the extremes of the curve.
 
     The first and the last sample are kept. Of each group of four other samples, the smallest and
-    the largest are kept. If a sample of the group is a word, the first and the last sample are kept
-    instead. This is repeated while there are too many samples.
+    the largest are kept. The value of a sample may also be a word. In a group with such a sample,
+    the first and the last sample are kept instead. This is repeated while there are too many
+    samples.
 
     Args:
         points: samples in order of time.

@@ -227,7 +227,8 @@ class Timeline:
         faults: the faults that occurred.
         events: actions, and missed expectations.
         lanes: the signals.
-        left_out: numbers of faults and signals that are not drawn, as text.
+        left_out: texts with the number of faults, or of signals, that are not drawn, such as
+            `3 faults`.
     """
 
     axis: TimeAxis

@@ -149,9 +149,10 @@ class DevicePlan:
     made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
 
     def made_of(self, seed: int = 0) -> tuple[object, ...]:
-        """Return the parameters with which the described device is made.
+        """Return the parameters with which a device of this description is made.
 
-        `MadeDevice` compares these parameters with the parameters of the device that it keeps.
+        `MadeDevice` keeps a device for a bench. It gives the device to the bench only if the device
+        was made with equal parameters.
 
         Args:
             seed: seed of all random numbers, for a device on a serial line.
@@ -193,7 +194,7 @@ class BusPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoorPlan:
-    """Addresses at which hosts find a wire in real time, as read from a rig file.
+    """Addresses at which hosts find a wire of a real-time bench, as read from a rig file.
 
     Attributes:
         link: symbolic link to the pty of a serial line, or None for no link.

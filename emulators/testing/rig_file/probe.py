@@ -39,7 +39,7 @@ class Probe:
         wire_faults: faults of the wire to the device. For a CANopen node these are the faults of
             the CAN bus.
         title: name of the device in messages.
-        baud: baud rate of the type of a serial device.
+        baud: baud rate that the type of a serial device has by default, or None for a CANopen node.
         node_id: node-ID of a CANopen node, from its DCF or model.
         bit_rate: bit rate of a CANopen node, from its DCF.
         start: initial values of inputs by name, only where the device's description gives another

@@ -76,10 +76,10 @@ class _SignalScope:
         A signal is returned as its name. Otherwise the result is an input or output of a device.
 
         Args:
-            name: name as in a formula: a signal, an input or output of the device in `owner`,
-                `DEVICE.NAME`, or `DEVICE/NAME` in quotes.
-            owner: name of the signal that has the formula. If the signal sets the input of a
-                device, the name is `DEVICE/INPUT`.
+            name: name as in a formula: a signal, `DEVICE.NAME`, or `DEVICE/NAME` in quotes. If
+                `owner` is `DEVICE/INPUT`, the name may also be an input or output of this device.
+            owner: signal that has the formula: `DEVICE/INPUT` if the signal sets an input of a
+                device, otherwise the name of the signal.
         """
         own, slash, _ = owner.partition(SLASH)
         full = name if SLASH in name else name.replace(".", SLASH, 1)
@@ -500,7 +500,7 @@ class _Target(Copyable):
         self._value: Setting | None = None
 
     def take(self, value: Setting) -> str:
-        """Set the driven input to a new value; return an error message, or "" if there is none."""
+        """Set the input to a new value of its signal; return an error message, or ""."""
         if not isinstance(value, str):
             value = min(max(value, self._item.low), self._item.high)
             if not isfinite(value):

@@ -35,7 +35,8 @@ class PortRecord:
 
     Args:
         plan: content of the rig file.
-        mounts: wires of an equivalent emulated bench, for the types of the wires.
+        mounts: emulated wires that correspond to the real wires. The header of the trace describes
+            the real wires with their names, devices and settings.
         now_us: function that returns the time in microseconds.
     """
 
@@ -158,8 +159,8 @@ class DoorJournal(Journal):
     def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Seen) -> None:
         """Add CAN frames of a host's connection to the journal.
 
-        A frame is left out if another connection of the same bus has already recorded it. The trace
-        has no error frames.
+        A frame is left out if another connection of the same bus has already recorded it. Error
+        frames are added to the journal, but not to the trace for `tickrig compare`.
         """
         with self._lock:
             self.record.passed(wire, mark, [each for each in frames if isinstance(each, CanFrame)])

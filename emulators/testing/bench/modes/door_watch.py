@@ -136,7 +136,9 @@ class WatchedLink(Generic[W]):
 
 
 class WatchedFrameLink(WatchedLink[Frames]):
-    """Wrapper of a host's `StampedLink` to a CAN bus that reports traffic and waits to a monitor.
+    """Wrapper of a host's `StampedLink` to a CAN bus, for a monitor of the host.
+
+    The monitor gets the frames that pass and the durations of the host's waits.
 
     Args:
         link: the wrapped link.
@@ -276,8 +278,8 @@ class CpuWaits:
             delay.
 
     Attributes:
-        worst_us: longest time that a thread has waited between two updates by `look`, up to now,
-            in microseconds. Between two updates there are about `_LOOK_US`.
+        worst_us: longest waiting time that a thread has collected between two updates, in
+            microseconds. The method `look` makes the updates.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:
@@ -286,10 +288,11 @@ class CpuWaits:
         self._seen_us, self._own = -_LOOK_US, ""
 
     def look(self, now_us: int) -> None:
-        """Update `worst_us` with the waits of all threads, unless the last update is recent.
+        """Update `worst_us` with the waits of all threads since the last update.
 
-        If the last update is longer ago than `_LONG_US`, the waits since then are ignored. Many
-        short waits would otherwise look like one long wait.
+        Nothing is done if the last update is less than `_LOOK_US` ago. If it is more than
+        `_LONG_US` ago, the waits since then are ignored. In such a long time, many short waits
+        would add up and look like one long wait.
 
         Args:
             now_us: present time in microseconds.

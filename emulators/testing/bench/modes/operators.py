@@ -93,8 +93,8 @@ class Terminal:
         path: path of the terminal device.
 
     Attributes:
-        hosts: functions of hosts that are called in turn, with a duration in microseconds, during
-            the wait for an answer.
+        hosts: functions that run the hosts while the human has not answered. They are called in
+            turn. The argument is the time for which the host runs, in microseconds.
     """
 
     def __init__(self, path: str = _TERMINAL) -> None:
@@ -489,13 +489,16 @@ _DeviceOperator = _HumanOperator | _EmulatorOperator
 
 
 class Operators:
-    """The operators of all real devices of a bench: humans, or control sockets of emulators.
+    """Sets inputs, reads outputs and starts faults of the devices of a bench of real devices.
+
+    A human does this at each real device. If an emulator in another process stands in for a real
+    device, it gets the requests through its control socket.
 
     Args:
         plan: content of the rig file.
         where: section of the rig file for real devices.
-        like: equivalent emulated devices, for the names of inputs, outputs and faults. These
-            devices do not run.
+        like: emulated devices with the same names and types. They do not run: only the names of
+            their inputs, outputs and faults are used.
         terminal: terminal of the human.
         journal: journal that records the actions.
 
@@ -585,9 +588,12 @@ class Operators:
         Args:
             owner: name of the device or wire with the fault, or empty if the fault may belong to
                 any.
-            order: requested fault. This method writes the full name of the fault into `order.spec`.
-                If the fault begins when a condition is true, the operator must be an emulator,
-                because a human is too slow.
+            order: requested fault. The name in `order.spec` is replaced by the full name of the
+                fault.
+
+        Raises:
+            NotOnThisBench: the fault begins when a condition is true, but a human operates the
+                device.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)

@@ -134,7 +134,8 @@ class _WaitLimit(HostLimit):
     ) -> None:
         """Count a read of the clock by a host, or a wait that took no time.
 
-        Such reads and waits do not advance the time. So a host that does nothing else never ends.
+        Virtual time does not advance at such a read or wait. A host that makes only such reads and
+        waits would therefore run forever. The count ends it by an exception.
 
         Raises:
             HostHangsError: there were too many such reads and waits.

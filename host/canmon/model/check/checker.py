@@ -210,8 +210,8 @@ class Checker(RuleCheck):
 
         Args:
             record: frame to check.
-            decoded: meaning of the frame. Rules that are expressions judge the frame only if it is
-                given.
+            decoded: meaning of the frame. Without it, rules that are expressions do not check the
+                frame.
         """
         if decoded is None or not self._expressions:
             return self._taken(record)
@@ -258,9 +258,9 @@ class Checker(RuleCheck):
             end_us: time in microseconds at which listening ended.
             lost: messages of the source about lost frames, and about lines of a log that are not
                 frames.
-            judged_us: time in microseconds up to which rules are checked that the user wrote as
-                expressions, such as `181 every 10ms`. None means `end_us`. If the source has no
-                clock, as standard input, the caller gives the time of the latest frame.
+            judged_us: end of the check of rules that are expressions, such as `181 every 10ms`, in
+                microseconds. None means `end_us`. For a source without a clock, such as standard
+                input, give the time of the latest frame.
             errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)

@@ -119,7 +119,11 @@ class _SignalState:
                 return
 
     def at(self, record: Record, decoded: Decoded) -> bool | None:
-        """Return the result of the test at a frame, or None if it is unknown."""
+        """Return whether the signals pass the test when a frame arrives, or None if unknown.
+
+        If the frame contains none of the signals, the result of the latest frame that contains one
+        is used.
+        """
         if any(find(decoded) is not None for find in self._finders):
             return self._test(record, decoded)
         latest = self._latest.get((record.channel, decoded.node if self._own else None))
@@ -160,11 +164,11 @@ class RuleEvent:
         return lambda decoded: any(find(decoded) is not None for find in finders)
 
     def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
-        """Return a function that finds the value to judge in a frame.
+        """Return a function that finds the signal of this event in a frame.
 
-        If the event is the name of a signal, the function returns this signal. For any other event,
-        the function returns the first signal of each frame that the event selects. If there is no
-        such signal in the frame, the function returns None.
+        If `is_signal` is true, the function returns the signal that `paths` names. Otherwise it
+        returns the first signal of each frame that passes the filter. If the frame has no such
+        signal, the function returns None.
         """
         matches = self.matches
         if self.is_signal:
@@ -188,7 +192,7 @@ def _said(decoded: Decoded) -> str:
 
 
 class RuleBreach(NamedTuple):
-    """A violation that a demand detects while no frame arrives, because a deadline has passed.
+    """A violation of a rule that is detected because a deadline has passed, not because of a frame.
 
     Attributes:
         at_us: time in microseconds at which the violation was detected.
@@ -249,7 +253,7 @@ class RuleDemand:
         Args:
             end_us: end of the traffic in microseconds, or the current time if the traffic
                 continues.
-            running: whether the rule applies at this time, because its scope is active.
+            running: whether the scope of the rule is active at this time, so that the rule applies.
         """
         return ()
 
@@ -828,8 +832,9 @@ class Follow(RuleDemand):
     """Base class of demands that compare each value with the previous value from the same CAN-ID.
 
     Args:
-        event: name of a signal, whose values are compared, or event that selects frames. In a
-            selected frame, the value of the first signal is compared.
+        event: event of the rule. If it is only the name of a signal, the values of this signal are
+            compared. Otherwise it is a filter of frames, and the value of the first signal in each
+            frame that passes is compared.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -885,8 +890,9 @@ class Steps(Follow):
     """Demand that limits how much a value may change from one frame to the next.
 
     Args:
-        event: name of a signal, or event that selects frames. Of a selected frame, the first value
-            is used.
+        event: event of the rule. If it is only the name of a signal, the values of this signal are
+            used. Otherwise it is a filter of frames, and the value of the first signal in each
+            frame that passes is used.
         most: largest allowed change of the value.
     """
 
@@ -909,8 +915,9 @@ class Changes(RuleDemand):
     it can be reported again.
 
     Args:
-        event: name of a signal, or event that selects frames. Of a selected frame, the first value
-            is used.
+        event: event of the rule. If it is only the name of a signal, the values of this signal are
+            used. Otherwise it is a filter of frames, and the value of the first signal in each
+            frame that passes is used.
         most_us: longest allowed time without a change, in microseconds.
     """
 

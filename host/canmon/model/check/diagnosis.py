@@ -220,10 +220,10 @@ class Diagnoser:
         self.kept = FrameKeeper()
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
-        """Store more frames, which must come in the order of the log.
+        """Store more frames. Call this method for all frames in the order of the log.
 
         Args:
-            frames: frames as a block of columns, or one record for each frame.
+            frames: the frames, as a block of columns or as records.
         """
         self.kept.take(frames)
 

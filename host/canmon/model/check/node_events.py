@@ -84,10 +84,9 @@ class BeatEvent(NamedTuple):
     Attributes:
         at_us: time of the event in microseconds.
         row: row of the event.
-        kind: kind of the event. An event of the kind `order` is an NMT reset or a write to 1017h.
-            The kind `excuse` is a boot-up after an NMT reset. Heartbeats that are missing before
-            such a boot-up are no fault. The kind `boot` is a boot-up without an NMT reset.
-            Heartbeats that are missing before an event of the kind `boot` or `order` are a fault.
+        kind: `order` is an NMT reset or a write to 1017h, `excuse` is a boot-up after an NMT reset,
+            and `boot` is a boot-up without an NMT reset. If heartbeats are missing before the
+            event, this is a fault for `order` and `boot`, but not for `excuse`.
     """
 
     at_us: int
@@ -141,7 +140,8 @@ def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
 
     Args:
         bus: frames of the bus.
-        rows: indices of the frames of each CAN-ID, by CAN-ID with flags.
+        rows: indices of the frames in `bus`, as one list for each CAN-ID. The key is the CAN-ID
+            with its flags, as in `bus.ident`.
     """
     good: Counter[str] = Counter()
     bad = 0
@@ -195,12 +195,13 @@ class BusEvents:
         times: corrected times of these frames in microseconds.
         decoder: decoder that combines SDO frames to transfers, and learns from the transferred
             values.
-        rows: indices of the frames of each CAN-ID, by CAN-ID with flags.
+        rows: indices of the frames in `bus`, as one list for each CAN-ID. The key is the CAN-ID
+            with its flags, as in `bus.ident`.
 
     Attributes:
         nodes: events of each node, by node-ID.
         hits: violations found so far.
-        cuts: events after which frames may have another rhythm.
+        cuts: events after which a node may send its frames with another period.
         commanded: whether the log contains any NMT command.
     """
 

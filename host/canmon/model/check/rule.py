@@ -203,7 +203,7 @@ class Rule:
         """Return a description of the violation in a frame, or None if the frame violates nothing.
 
         Args:
-            record: frame to judge, whose CAN-ID the rule wants.
+            record: frame to judge. The method `wants` returned True for its CAN-ID.
             gap_us: time in microseconds since the previous frame of this CAN-ID on this bus, or
                 None for the first frame.
         """
@@ -235,11 +235,14 @@ class Rule:
         return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Return a description of each frame that is missing at the end of the traffic.
+        """Return a description of each violation that is known only at the end of the traffic.
+
+        An example is a heartbeat that has stopped.
 
         Args:
-            latest_us: times of the last frame of each identifier, on any bus.
-            end_us: end of the traffic.
+            latest_us: time of the last frame of each CAN-ID in microseconds, by CAN-ID. All buses
+                are taken together.
+            end_us: end of the traffic in microseconds.
         """
         return ()
 
@@ -389,9 +392,9 @@ class Heartbeat(Rule):
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Return the reason why nothing was judged, if there was no gap to compare.
 
-        If there was a gap, the result is an empty text. The gap from a boot-up to the next
-        heartbeat is not compared. The gap from the last heartbeat to a boot-up is compared only if
-        no NMT command has reset the node.
+        A gap is the time between two successive heartbeats. If there was a gap, the result is an
+        empty text. The time from a boot-up to the next heartbeat is no such gap. The time from the
+        last heartbeat to a boot-up is one only if no NMT command has reset the node.
         """
         if evidence.untimed:
             return ONE_TIME
