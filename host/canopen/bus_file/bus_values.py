@@ -129,8 +129,8 @@ class BusSlave:
         heartbeat_producer_ms: producer heartbeat time of the slave after the writes, or 0 for no
             heartbeat.
         heartbeat_consumer: whether the slave watches the master's heartbeat.
-        heartbeat_multiplier: number of producer heartbeat times that the master waits for a
-            heartbeat.
+        heartbeat_multiplier: time that the master waits for a heartbeat, as a multiple of the
+            producer heartbeat time.
         guard_time_ms: guard time, or 0 for no node guarding.
         life_time_factor: life time factor of node guarding.
         emcy_cob_id: COB-ID of the EMCY message with its upper bits.
@@ -205,8 +205,8 @@ class BusMaster:
         sync_overflow: synchronous counter overflow value (object 1019h).
         heartbeat_producer_ms: producer heartbeat time of the master, or 0 for no heartbeat.
         heartbeat_consumer: whether the master watches the heartbeats of the slaves.
-        heartbeat_multiplier: number of producer heartbeat times that the slaves wait for a
-            heartbeat.
+        heartbeat_multiplier: time that the slaves wait for a heartbeat, as a multiple of the
+            producer heartbeat time.
         emcy_inhibit_time_100us: inhibit time of EMCY messages (object 1015h).
         nmt_inhibit_time_100us: inhibit time of NMT commands (object 102Ah).
         error_behavior: error behavior (object 1029h) by sub-index.
@@ -258,8 +258,8 @@ class BusDefaults:
     Attributes:
         dcf_path: folder in which the master looks for the DCF files at run time, as written in the
             file.
-        heartbeat_multiplier: number of producer heartbeat times that a consumer waits for a
-            heartbeat.
+        heartbeat_multiplier: time that a consumer waits for a heartbeat, as a multiple of the
+            producer heartbeat time.
         retry_factor: number of attempts of node guarding.
         extra: content of the key `tickrig:` of the section.
     """

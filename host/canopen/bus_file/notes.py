@@ -72,7 +72,7 @@ class BusFileNotes:
 
 
 class BusFileSection:
-    """A section of a bus.yml, whose methods read values and report invalid ones, as dcfgen would.
+    """A section of a bus.yml. Its methods read values, and report invalid values.
 
     Args:
         notes: collector of the findings.

@@ -79,7 +79,8 @@ class PdoReader:
             first: index of the communication parameter of PDO 1.
 
         Returns:
-            The PDOs that are added to the object dictionary of the master.
+            The PDOs of the slave that the master uses. The caller adds them to the PDOs in the
+            object dictionary of the master.
         """
         pdos = {
             index - first + 1: _of_sheet(self._sheet, index) for index in self._sheet.pdos(first)

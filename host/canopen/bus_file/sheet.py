@@ -59,7 +59,10 @@ class Sheet:
         return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
-        """Return the entries of an object by sub-index, or an empty result without the object."""
+        """Return the entries of an object by sub-index.
+
+        The result is empty if the object does not exist.
+        """
         return self._rows.get(index, {})
 
     def row(self, index: int, sub: int) -> EntryDescription | None:

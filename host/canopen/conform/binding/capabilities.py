@@ -167,7 +167,7 @@ def find_features(
     nodes on the bus. Without an EDS the tester assumes that the node has no LSS.
 
     Args:
-        binding: objects of the node by the names in checks.
+        binding: assignment of the names in checks to objects of the node.
         client: SDO client that tries a block upload.
         claims: capabilities that the EDS states, or None without an EDS.
     """

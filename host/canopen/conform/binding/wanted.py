@@ -101,9 +101,11 @@ class WantedObject(NamedTuple):
         """Return the objects of a node that can take the place of this name, in the given order.
 
         A check contains the name in place of an index and sub-index. The run replaces the name by
-        one of these objects. If checks write to the name, they may write any value between the
-        limits of the object. Then a communication object (1000h to 1FFFh) is in the result only if
-        CiA 301 allows all these values.
+        one of these objects.
+
+        If checks write to the object and restore it (`Use.WRITE`), they may write any value between
+        its limits. For such a name, a communication object (1000h to 1FFFh) is in the result only
+        if CiA 301 allows all values between its limits.
         """
         # One loop without function calls, which took a tenth of the time of a single check.
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE
