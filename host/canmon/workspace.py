@@ -520,9 +520,10 @@ def below(*path: str | int) -> Iterator[None]:
 
 
 def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
-    """Return the bus name in the settings of a sending panel, or an empty text for the first bus.
+    """Return the bus name in the settings of a sending panel.
 
-    If the source is a log, no bus is open, and any name is valid.
+    If the settings have no bus name, the result is an empty text, which stands for the first bus.
+    The name is checked only if a bus is open.
 
     Raises:
         SettingError: no open bus has this name.

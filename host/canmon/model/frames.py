@@ -356,9 +356,9 @@ def stamp_text(
         at_us: time to write, in microseconds.
         origin_us: time of the first frame.
         before_us: time of the previous line.
-        digits: two minimum numbers of digits before the decimal point. The first number is for
-            absolute times. The second number is for times that count from `origin_us` or
-            `before_us`.
+        digits: pair of widths. A width is the minimum number of digits before the decimal point.
+            The first width is for absolute times. The second width is for times that count from
+            `origin_us` or `before_us`.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
@@ -476,9 +476,10 @@ class LogTime(NamedTuple):
     text: str
 
     def after(self, first_us: int) -> int:
-        """Return this point in time, in microseconds on the clock of a log.
+        """Convert this point in time to microseconds on the clock of a log.
 
-        `first_us` is the time of the first frame of the log.
+        Args:
+            first_us: time of the first frame of the log in microseconds.
         """
         return self.us if self.dated else first_us + self.us
 

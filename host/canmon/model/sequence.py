@@ -481,8 +481,10 @@ class TomlSequence:
         text: content of the file.
         file: name of the file for messages.
         variables: values by name, which override those of the table `[vars]` in the file.
-        resolve: function that converts a text without a `#` in a `send` step to a frame.
-        condition: function that converts a text without a `#` in an `expect` step to a condition.
+        resolve: function that converts the text of a `send` step to a frame. It is used only if the
+            text contains no `#`. A text with a `#` is a CAN-ID and data, such as `123#DEADBEEF`.
+        condition: function that converts a text of an `expect` step to a condition. It is used only
+            if the text contains no `#`. A text with a `#` is a pattern of a frame.
     """
 
     def __init__(

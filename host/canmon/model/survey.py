@@ -73,9 +73,9 @@ class TimeBins(Generic[_Key]):
         self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
-        """Make sure that the time `at_us` lies in a span.
+        """Make sure that one of the spans can contain the time `at_us`.
 
-        For a late time, the spans are widened and merged.
+        If this would need too many spans, they are merged into wider spans.
         """
         shift = (at_us // self.width_us // self._most).bit_length()
         if not shift:
@@ -442,8 +442,9 @@ def excerpts(
         frames: number of frames to include before and after each chosen frame.
 
     Returns:
-        A dictionary with the position of each chosen frame as its key. Each value has the position
-        in the log of the first frame of the excerpt, and the frames of the excerpt.
+        A dictionary with one excerpt for each chosen frame. The key is the position of the chosen
+        frame in the log. The value is the position where the excerpt begins in the log, and the
+        frames of the excerpt.
     """
     order = deque(sorted(set(numbers)))
     found: dict[int, _Frames] = {}

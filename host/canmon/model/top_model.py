@@ -500,7 +500,10 @@ class TopModel:
 
 
 def meaning_text(decoded: Decoded) -> str:
-    """Return the decoded meaning of a frame as text, with its node and the source of the names."""
+    """Return the decoded meaning of a frame as text.
+
+    The text includes the node, and the source of the signal names, such as an EDS file.
+    """
     node = "" if decoded.node is None else f"{decoded.node} "
     source = f" ({decoded.source})" if decoded.source else ""
     return in_cells(f"{node}{decoded.kind} {decoded.text}".rstrip() + source)

@@ -539,8 +539,8 @@ class Load:
         """Count the bits of a frame.
 
         Returns:
-            If the frame is the first one after the current second, the bits of this complete
-            second, otherwise None.
+            If the frame is later than the current second, the bits of this second, which is then
+            complete. Otherwise None.
         """
         self._bits += bits
         if at_us < self.begin_us + WINDOW_US:
@@ -552,10 +552,11 @@ class Load:
         return ended
 
     def end(self, end_us: int) -> BusSecond:
-        """Return the bits of the last second of the traffic, which may be incomplete.
+        """Return the last second of the traffic, which may be incomplete.
 
-        If the traffic in this second lasts at least `LEAST_WINDOW_US`, the load is calculated for
-        its real duration, otherwise for a full second.
+        The result holds the bits in this second, and the duration for the calculation of the load.
+        This is the real duration of the traffic in this second, if it is at least
+        `LEAST_WINDOW_US`. Otherwise, it is a full second.
 
         Args:
             end_us: end of the traffic in microseconds.
@@ -631,8 +632,8 @@ class TrafficSnapshot(NamedTuple):
 
     Attributes:
         at_us: time of the snapshot in microseconds.
-        buses: statistics of each bus, by its name.
-        rows: statistics of each CAN-ID, by bus and CAN-ID with flags.
+        buses: statistics of the buses, sorted by name.
+        rows: statistics of the CAN-IDs of each bus, sorted by bus and CAN-ID.
     """
 
     at_us: int = 0
@@ -727,9 +728,9 @@ class Traffic:
         self._buses.clear()
 
     def notch(self) -> None:
-        """Mark all payload bits that have changed so far as known.
+        """Hide further changes of all payload bits that have changed until now.
 
-        Only changes of other bits are shown from then on.
+        From then on, only changes of other payload bits are shown.
         """
         for bus in self._buses.values():
             bus.notch()
@@ -738,8 +739,8 @@ class Traffic:
         """Return the present statistics of all buses and CAN-IDs.
 
         Args:
-            now_us: present time in microseconds, or None if the traffic has ended with its latest
-                frame.
+            now_us: present time in microseconds. None means that the traffic has ended. Then the
+                time of the latest frame is used.
         """
         at_us = self._last_us if now_us is None else now_us
         buses = [self._buses[name] for name in sorted(self._buses)]
@@ -751,6 +752,7 @@ class Traffic:
 
         Args:
             now_us: present time in microseconds.
-            ended: whether no more frames follow, so that the last second is over.
+            ended: whether the traffic has ended. If True, the last second may be incomplete, and
+                its load is calculated as in `Load.end`.
         """
         return tuple(self._buses[name].row(now_us, ended=ended) for name in sorted(self._buses))

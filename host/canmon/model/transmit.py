@@ -210,7 +210,8 @@ class PdoFrames:
     def remember(self, text: str) -> None:
         """Store the values that a sent PDO gave to its objects.
 
-        A later PDO that does not name these objects uses the stored values.
+        If the text of a later frame of the same PDO does not give a value for one of these objects,
+        the object gets the stored value.
         """
         pdo, (_, fields) = text.split(maxsplit=1)[0].lower(), self._fields(text)
         self._remembered[pdo] = {place.name: value for place, value in fields}
@@ -428,7 +429,7 @@ class TransmitList:
         self.rows[number].enable(now_us)
 
     def once(self, number: int) -> AnyFrames:
-        """Return the frame to send now, so that a row of the transmit list is sent a single time.
+        """Return the frame of a row of the transmit list. The caller sends it once.
 
         Args:
             number: number of the row in the list, from 0.

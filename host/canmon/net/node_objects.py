@@ -71,8 +71,9 @@ class NamedObjects:
     Args:
         node_id: node-ID of the node.
         file: EDS file of the node, or None for no file.
-        known: description of the device, if it is known without a file.
-        name: name of the EDS from which the description `known` comes.
+        known: description of the device, used only if `file` is None. None if there is no
+            description.
+        name: name of the EDS that the description `known` was made from.
 
     Attributes:
         node_id: node-ID of the node.

@@ -322,7 +322,8 @@ span_option: Final = time_option(
 def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
     """Return the nominal and the data bit rate of a bus.
 
-    The options give the bit rates, or a SOURCE word such as can0@500k/2M.
+    Each bit rate comes from its option. If the option is missing, the bit rate comes from a SOURCE
+    word such as can0@500k/2M.
     """
     buses = [word for word in map(parse_source, words) if isinstance(word, BusSpec)]
     nominal = [options.bitrate, *(bus.bitrate for bus in buses)]

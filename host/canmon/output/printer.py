@@ -62,10 +62,10 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Let the decoder learn from the frames before the part of the log that `cut` selects.
+        """Return a `LogCut` with which the decoder learns from the frames before the part of a log.
 
-        The command does not print these frames. The result is a `LogCut` for the same part of the
-        log. With it, the reader of the log also passes the earlier frames to the decoder.
+        The part is the same as that of `cut`. When the log is read with the result, the reader
+        passes the frames before the part to the decoder. The command does not print these frames.
         """
         if self._decoder is None or cut.begin is None:
             return cut
@@ -97,7 +97,8 @@ class FilteredDecoder:
     def messages(self) -> list[str]:
         """Return one line for each signal or kind of frame in the filter that never occurred.
 
-        If all signals and kinds of frames occurred, return a line that states that no frame passed.
+        If all of them occurred, but no frame passed the filter, the result is one line that states
+        this.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:

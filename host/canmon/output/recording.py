@@ -253,7 +253,9 @@ class RecordingOptions:
 
 
 def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
-    """Parse the file name and options of a recording in parts, as after `canmon dump -l`.
+    """Parse the file name and options of a recording, as after `canmon dump -l`.
+
+    The recording will be written in parts.
 
     Args:
         words: text with the file name and the options.

@@ -68,8 +68,9 @@ class Verdict(NamedTuple):
 
     Attributes:
         diagnosis: result of the diagnosis.
-        around: excerpt of the log around a frame, by the number of that frame. An excerpt consists
-            of the number of its first frame, and of its frames.
+        around: excerpts of the log. Each key is the number of a frame, and its value is the excerpt
+            around this frame. An excerpt consists of the number of its first frame, and of its
+            frames.
     """
 
     diagnosis: Diagnosis

@@ -63,7 +63,7 @@ class SocketReader:
 
     Attributes:
         lost: number of frames that the kernel dropped because its queue was full.
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
         stepped: always False, because a SocketCAN bus runs in real time. The readers of emulated
             buses in virtual time have the value True.
     """
@@ -191,7 +191,7 @@ class BusReader:
     Attributes:
         reads: object that reads single frames, and counts frames that the driver could not read.
         lost: number of lost frames, which is always 0 because python-can does not report losses.
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
         stepped: whether virtual time passes only while the bus is read.
     """
 
@@ -242,7 +242,7 @@ class OpenBus:
         options: options of the bus on the command line.
 
     Attributes:
-        bus: open bus of python-can, which a new opening replaces.
+        bus: open bus of python-can. The method `open_again` replaces it by a new one.
         name: name of the bus.
 
     Raises:
@@ -275,10 +275,12 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     If the word and an option both give a bit rate, the word has priority. The words `udp` and `sim`
     give the interface, even if the option `-i` gives another one.
 
-    If the option `-i` gives the interface, any other word gives only the channel and bit rates:
+    If there is an option `-i`, it gives the interface for any other word. Bit rates at the end of
+    the word, such as `@500k`, do not belong to the channel. The channel is one of these:
 
-    - If the word begins with the name of this interface and a colon, the channel is the rest.
-    - Otherwise, the channel is the whole word before its bit rates, even if it contains colons.
+    - If the word begins with the name of this interface and a colon, the channel is the text after
+      the colon.
+    - Otherwise, the channel is the whole text, even if it contains colons.
 
     Raises:
         Refused: the word and -c name different channels.
@@ -315,7 +317,7 @@ _SEND_TIMEOUT_S: Final = 1
 
 
 class Transmitter:
-    """An open CAN bus that a command sends frames on, such as `canmon send`.
+    """An open CAN bus on which a command, such as `canmon send`, sends frames.
 
     Args:
         word: SOURCE word that names the bus, or None if the options name it.

@@ -37,7 +37,7 @@ class Reader(Protocol[_Read_co]):
 
     Attributes:
         name: name of the bus or port.
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
         stepped: whether virtual time passes only while the bus is read. Such a bus may be read only
             by the thread that opened it.
     """
@@ -64,11 +64,13 @@ class Reader(Protocol[_Read_co]):
 
 
 class LiveSource(AnySource[_Item]):
-    """Source of frames from one or more buses or serial ports, each of which has its own thread.
+    """Source of frames from one or more buses or serial ports.
 
-    Frames wait in a queue of limited size until the caller fetches them. If the queue is full,
-    further frames are lost and counted. A bus in virtual time has no thread. The caller reads such
-    a bus by `poll`, and its time passes during this call.
+    Each bus in real time and each serial port has its own thread. Frames wait in a queue of limited
+    size until the caller fetches them. If the queue is full, further frames are lost and counted.
+
+    A bus in virtual time has no thread. The caller reads such a bus by `poll`, and its time passes
+    during this call.
 
     Args:
         readers: readers of the open buses and ports.
@@ -123,7 +125,7 @@ class LiveSource(AnySource[_Item]):
             one.wanted = True
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
-        """Return the counts of items that are not frames, for each bus or port with its name."""
+        """Return the name of each bus or port, with its counts of items not read as frames."""
         return [(reader.name, reader.tally) for reader in self._readers]
 
     @property
@@ -134,7 +136,8 @@ class LiveSource(AnySource[_Item]):
     def poll(self, timeout_us: int, /) -> list[_Item]:
         """Wait at most `timeout_us` for a first frame.
 
-        Return all frames that have arrived, up to the next mark.
+        Return all frames that have arrived. A mark is an event among the frames, such as a bus that
+        went away. If a mark has arrived, return only the frames before it.
         """
         self.marks = ()
         for reader, chosen in self._stepped:
@@ -241,7 +244,7 @@ class ReopeningReader(Generic[_Item]):
 
     Attributes:
         name: name of the first reader.
-        tally: counts of items that are not frames, of all readers.
+        tally: counts of items that were not returned as frames, of all readers.
         stepped: whether virtual time passes while the bus is read, which is always False.
         wanted: whether to open the bus again.
         gaps: number of times that the bus went away.

@@ -93,7 +93,7 @@ class AnySource(Generic[_Taken_co]):
         """Open buses that go away again. A source with an end is not affected."""
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
-        """Return the counts of items that are not frames, for each bus or file with its name."""
+        """Return the name of each bus or file, with its counts of items not read as frames."""
         return ()
 
     @property
@@ -125,9 +125,10 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def nothing_passed(self) -> bool:
-        """Whether the source has frames, but none passed its filters.
+        """Whether the source has frames, but none was selected.
 
-        The filters are those in the SOURCE words, and the wanted part of a log.
+        The SOURCE words may have filters that select frames. In a log, only the frames of the
+        wanted part are selected.
         """
         return self._cut is not None and self._cut.empty
 
@@ -175,14 +176,14 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A CAN bus as a SOURCE word of the command line names it, with a filter for its frames.
+    """Result of parsing a SOURCE word for a CAN bus, with a filter for the frames of the bus.
 
     If an attribute is None, the options of the command give the value. A bus with a data bit rate
     is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon of the word. If the option `-i` names the interface,
-            this text is a part of the channel.
+        prefix: text before the first colon of the word. This text is the interface. If the option
+            `-i` names another interface, the text belongs to the channel instead.
     """
 
     interface: str | None = None
@@ -195,7 +196,7 @@ class BusSpec:
 
 @dataclass(frozen=True, slots=True)
 class LineSpec:
-    """A serial port as a SOURCE word of the command line names it, with the protocol of its line.
+    """Result of parsing a SOURCE word for a serial port, with the protocol of the serial line.
 
     Attributes:
         port: device name or pyserial URL of the port.
@@ -424,6 +425,8 @@ class _LoggedSource(AnySource[Record]):
 
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Return the next frames of the log, up to the next mark.
+
+        A mark is an event among the frames, such as lost frames.
 
         If the log comes through a pipe, the method waits for some frames.
         """
@@ -702,9 +705,9 @@ def _large_log(words: Sequence[str], cut: LogCut) -> Path | None:
 def open_source(
     words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
 ) -> Source:
-    """Open the source that SOURCE words name, for a command that reads only CAN frames.
+    """Open the source of a command that reads only CAN frames.
 
-    Serial ports are refused. Apart from this, the function is the same as `open_any`.
+    The function is the same as `open_any`, except that it refuses serial ports.
     """
     source = open_any(words, options or BusOptions(), cut, lines_too=False)
     return cast("Source", source)  # without lines: frames
@@ -782,5 +785,5 @@ def _open_live(
 
 
 def is_live(word: str) -> bool:
-    """Return whether a SOURCE word names anything but a log file, such as a bus."""
+    """Return whether a SOURCE word is a bus, a serial port or standard input, not a log file."""
     return not isinstance(parse_source(word), FileSpec)

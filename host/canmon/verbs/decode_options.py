@@ -127,7 +127,7 @@ def make_decoder(eds: EdsOptions = _NO_EDS, dbc: Sequence[Path] = ()) -> Decoder
 
 
 def decoder_of(objects: Mapping[int, node_memory.EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
-    """Make the decoder of a command from EDS files that were read already, and from DBC files."""
+    """Make a decoder from the contents of EDS files by node-ID, and from the paths of DBC files."""
     with refusing_dbc():
         return extensions.make_decoder(objects, dbc)
 

@@ -472,12 +472,14 @@ class _Watched:
     def boot(self, at_us: int, reset_us: int | None) -> str | None:
         """Process a boot-up of the node.
 
-        The result is a description of the violation if a heartbeat was lost before the boot-up or
-        the reset, otherwise None.
+        The method checks whether the heartbeat was overdue at the reset, or at the boot-up if there
+        was no reset. If it was overdue, the result is a description of this violation, otherwise
+        None.
 
         Args:
             at_us: time of the boot-up in microseconds.
-            reset_us: time of the NMT reset that explains the boot-up, or None without a reset.
+            reset_us: time of the NMT reset before the boot-up in microseconds, or None if there was
+                no reset.
         """
         said = self._surely_overdue(at_us if reset_us is None else reset_us)
         self._memory.boot()
@@ -580,8 +582,8 @@ class NoLostHeartbeat(Rule):
     def wants(self, ident: int, /) -> bool:
         """Return whether the rule must see the frames of a CAN-ID.
 
-        These are error control frames, SDO frames, because an SDO transfer may contain 1017h, and
-        NMT commands, because they reset nodes.
+        The rule must see error control frames, SDO frames and NMT commands. An SDO transfer may
+        contain 1017h. NMT commands may reset nodes.
 
         Args:
             ident: CAN-ID with flags.

@@ -54,8 +54,6 @@ _MARK: Final = "\x01"
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
     """Pack each text into the bytes of one integer, and return the array of integers.
 
-    The array is a lookup table: numpy can take the texts of many rows from it at once by index.
-
     Args:
         texts: ASCII texts. A text may have at most as many characters as an integer of the array
             has bytes.
@@ -303,17 +301,16 @@ def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Ma
     """Return the physical values of many integers as texts.
 
     The text of a value is right if it is equal to the text that `str` gives for the value as a
-    float. This function calculates with integers, so some of its texts may be wrong. For these
-    rows, the caller must use `str`.
+    float. This function calculates with integers, so a text may be wrong. The returned mask is True
+    for each row whose text is surely right. For all other rows, the caller must use `str`.
 
     Args:
         numbers: integers from the frames.
         scale: conversion of the integers to physical values.
 
     Returns:
-        The parts of the texts, and a mask. The parts are sign, digits before the decimal point,
-        point, and decimals. The caller joins them row by row. The mask is True for each row whose
-        text is surely right.
+        The parts of the texts, and the mask. The parts are sign, digits before the decimal point,
+        point, and decimals. The caller joins them row by row.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)

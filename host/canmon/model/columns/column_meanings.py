@@ -742,17 +742,16 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Pairs of an expedited SDO request and its answer, which add no knowledge about the node.
+    """Pairs of an expedited SDO request and its answer. They add no knowledge about the node.
 
-    Such pairs occur, for example, when a master polls one object repeatedly. Of a series of pairs,
-    only the first and the last must be decoded.
+    Such pairs occur, for example, when a master polls one object repeatedly. Successive pairs with
+    one node form a series. Only the first and the last pair of a series must be decoded.
 
     Attributes:
         requests: rows of the requests.
         answers: rows of the answers, in the same order.
-        inner: mask with one value for each pair. The value is True if the pair is inside a series,
-            which means that the previous and the next SDO exchange with this node are pairs, too.
-            Such a pair need not be decoded.
+        inner: mask with one value for each pair. The value is True if the pair is neither the first
+            nor the last of its series. Such a pair need not be decoded.
     """
 
     requests: Ints

@@ -211,11 +211,11 @@ class _Frames(NamedTuple):
 
         Args:
             frames: frames of the bus.
-            rows: rows of the SDO frames.
-            places: row of each frame of the bus in the block, which contains the frames of all
-                buses.
-            side: sender and receiver of each frame of the bus: SDO channel, node-ID, and whether
-                the client sent the frame.
+            rows: rows of the SDO frames in `frames`.
+            places: for each row of `frames`, the row of the same frame in the block with the frames
+                of all buses.
+            side: for each row of `frames`, the SDO channel, the node-ID, and whether the client
+                sent the frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]
@@ -273,10 +273,11 @@ class _Part(NamedTuple):
 
 
 class ColumnSdo:
-    """Decoder for the SDO frames of a bus that processes whole blocks of frames, with numpy.
+    """Decoder for the SDO frames of a bus. It processes whole blocks of frames, with numpy.
 
     Args:
-        bus: decoder for single frames of this bus. It may decode other frames between two blocks.
+        bus: decoder for single frames of this bus. Between two calls of `take`, the caller may
+            decode frames with it.
     """
 
     def __init__(self, bus: BusDecoder) -> None:
@@ -292,14 +293,16 @@ class ColumnSdo:
         places: Ints,
         texts: cells.Texts,
     ) -> None:
-        """Write the meanings of SDO frames that do not change what is known about any node.
+        """Write the meanings of the SDO frames of one bus into the texts of a block of frames.
+
+        No frame of the bus may change what is known about a node.
 
         Args:
-            frames: frames of the bus.
-            speakers: three values for each sender of SDO frames: the SDO channel, whether the
-                sender is the client, and the rows of its frames.
-            places: index in `texts` of each frame.
-            texts: texts of the block, to which the meanings are added.
+            frames: frames of the bus in the block.
+            speakers: senders of the SDO frames. Each sender has three values: the SDO channel,
+                whether the sender is the client, and the rows of its frames in `frames`.
+            places: for each row of `frames`, the index of its text in `texts`.
+            texts: texts of the block. The method adds the meanings to them.
         """
         known = self._bus.version
         if known != self._known or len(self._texts) + len(self._writers) > _MOST_TEXTS:

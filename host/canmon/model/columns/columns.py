@@ -219,10 +219,12 @@ class Runs:
         return self.ends - self.begins
 
     def sums(self, values: Ints) -> Ints:
-        """Return the sum of some values for each run.
+        """Add up the values of each run, and return one sum for each run.
+
+        A run consists of the rows of one CAN-ID.
 
         Args:
-            values: one value for each row, sorted as in `order`.
+            values: one value for each row, in the sequence of `order`.
         """
         return np.add.reduceat(values, self.begins)
 

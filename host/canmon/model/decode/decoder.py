@@ -196,7 +196,10 @@ class BusDecoder:
         return route if by_frame or self.layout(can_id) is not None else None
 
     def layout(self, can_id: int) -> PdoDecoder | None:
-        """Return the PDO decoder of a CAN-ID, or None without a PDO or for a multiplexed PDO."""
+        """Return the PDO decoder of a CAN-ID.
+
+        The result is None if the CAN-ID belongs to no PDO, or to a multiplexed PDO.
+        """
         layout = getattr(self._routed(can_id), "__self__", None)
         return layout if isinstance(layout, PdoDecoder) else None
 
@@ -239,9 +242,9 @@ class BusDecoder:
         return not self.memory(node).number(*node_memory.HEARTBEAT_TIME)
 
     def guard(self, node: int, *, requested: bool) -> None:
-        """Record whether the latest error control frame of a node was a guarding request.
+        """Store whether the latest error control frame of a node was a guarding request.
 
-        The next error control frame after a request is decoded as the answer of the node.
+        If it was a request, the next error control frame is decoded as the answer of the node.
 
         Args:
             node: node-ID of the node.
@@ -317,12 +320,14 @@ class BusDecoder:
         return self.sdo_step(node, take(at_us, frame.data))
 
     def sdo_step(self, node: int, step: SdoStep) -> Decoded:
-        """Return the meaning of an SDO frame, and learn from the transfers that the frame ended.
+        """Return the meaning of an SDO frame.
+
+        If a transfer ended with the frame, the decoder may learn from the transferred value, for
+        example a COB-ID.
 
         Args:
             node: node-ID of the SDO server.
-            step: result of `SdoChannel` for the frame: its text, and the transfers that ended with
-                it.
+            step: result of `SdoChannel` for the frame.
         """
         if not step.ended:
             return Decoded(

@@ -349,8 +349,9 @@ class MissingSignals:
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
-        words: comparisons in filters such as `kind=word`, each as a pair of the field and the word.
-            They are the comparisons with words that no built-in decoder uses in this field.
+        words: comparisons with an unknown word in filters, such as `kind=word`. Each is a pair of
+            the field (`kind`) and the word. A word is unknown if no built-in decoder uses it as a
+            value of the field.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -679,9 +680,9 @@ class Filter:
         matches: function that returns whether a frame passes the filter.
         signals: names of the signals in the filter, so that signals that never occur can be
             reported.
-        words: comparisons in the filter such as `kind=word`, each as a pair of the field and the
-            word. They are the comparisons with words that no built-in decoder uses in this field.
-            Such a word is misspelt, or the decoder of an installed package uses it.
+        words: comparisons with an unknown word in the filter, such as `kind=word`. Each is a pair
+            of the field (`kind`) and the word. A word is unknown if no built-in decoder uses it as
+            a value of the field. It is misspelt, or the decoder of an installed package uses it.
     """
 
     text: str

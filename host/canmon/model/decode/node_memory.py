@@ -338,7 +338,8 @@ class NodeMemory:
     """Everything that is known about the objects of one node, from SDO traffic and an EDS file.
 
     A value that was written to the node is valid until the node boots. After the boot-up, the
-    earlier value is valid again, unless the node was commanded to store its parameters (1010h).
+    power-on value is valid again. If the node was commanded to store its parameters (1010h) after
+    the write, the written value is the new power-on value.
 
     Args:
         eds: content of the node's EDS file, or None. Its power-on values are valid until the
@@ -583,13 +584,13 @@ PAIR_US: Final = 100_000
 class TwoBeats(NamedTuple):
     """Two heartbeats with the same CAN-ID and period, as sent by two nodes with the same node-ID.
 
-    The frames of the two heartbeats alternate.
+    The frames of the two heartbeats alternate. A gap is the time between two successive frames. So
+    short and long gaps alternate, and a short gap and the next long gap together are one period.
 
     Attributes:
         period_us: period of each of the two heartbeats in microseconds.
-        places: indices of the gaps that show the two heartbeats. Gap n is the time between frame n
-            and frame n + 1. Gap n is in the list if it is longer or shorter than gap n + 1, and the
-            sum of the two gaps is about one period.
+        places: index of each gap that differs in length from the next gap, if the sum of these two
+            gaps is about one period. Gap n begins with frame n.
     """
 
     period_us: int

@@ -133,14 +133,14 @@ class _Stop(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """The curve of a signal with numeric values, reduced to the columns of a picture.
+    """The curve of a signal with numeric values, reduced to one entry for each picture column.
 
     Attributes:
         label: displayed name of the curve.
         axis: number of the vertical axis that the curve belongs to, from 1.
         unit: unit of the values.
-        stops: the columns of the picture that have samples, from left to right, each with the
-            values of the curve in this column.
+        stops: one entry for each column of the picture with samples, from left to right. An entry
+            holds the number of the column, and the values of the curve in this column.
     """
 
     label: str

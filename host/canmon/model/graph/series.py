@@ -289,7 +289,9 @@ class CurveSpec:
 def parse_signal(text: str) -> CurveSpec:
     """Parse the request for a curve, which has the form `[LABEL=]SIGNAL[@AXIS]`.
 
-    The signal is bits of a frame, such as `181[2:6]s*0.001`, or an object, such as `3.position`.
+    `LABEL` is the displayed name of the curve. `SIGNAL` is bits of a frame, such as
+    `181[2:6]s*0.001`, or an object, such as `3.position`. `AXIS` is the number of the vertical
+    axis, 1 by default.
 
     Args:
         text: text of the request.

@@ -167,9 +167,9 @@ class CanLogReader:
 
 
 def channel_name(channel: object) -> str:
-    """Return the name of a bus for the channel of a log, shortened to a length that logs can hold.
+    """Return the bus name for a channel, shortened to a length that logs can hold.
 
-    Some formats have only numbers. The channel 0 is then named `can0`.
+    If the channel is only a number, such as 0, the bus name is `can0`.
     """
     name = "_".join(str(channel).split())
     if channel is None or not name:
@@ -410,8 +410,8 @@ class _AscWriter:
         block one by one. There are three reasons:
 
         - The block contains error frames.
-        - A frame of the block is earlier than the first frame of the log. In an empty log, the
-          first frame of the block will be the first frame of the log.
+        - A frame of the block is earlier than the first frame of the log. If the log is empty: a
+          frame of the block is earlier than the first frame of the block.
         - A time is too long to be exact as a floating-point number.
         """
         first_us, earliest_us = block.first_us, block.earliest_us

@@ -111,9 +111,11 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return the clock that fits the time stamps in a text of candump lines.
+        """Make a clock for the time stamps in a text of candump lines.
 
-        If the stamps often decrease, or decrease by much, they count from the previous frame.
+        Such stamps count from the first frame or from the previous frame. If the stamps in the text
+        often decrease, or decrease by much, the clock assumes that they count from the previous
+        frame. Otherwise, it assumes that they count from the first frame.
         """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
@@ -302,7 +304,7 @@ def parse_log_line(
     Args:
         line: line without its LF.
         number: number of the line, from 1.
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
         clock: clock for the lines of a screen.
     """
     text = line.strip()
@@ -396,8 +398,7 @@ class LogLines:
         Args:
             lines: number of lines.
             latest_us: time of the last frame in the lines, or None if they hold no frame.
-            unusual: whether one of the lines is not a data frame in the form that candump writes,
-                as `is_usual` determines.
+            unusual: whether `is_usual` is False for at least one of the lines.
         """
         self.number += lines
         if unusual:
@@ -498,7 +499,7 @@ class LogReader(Protocol):
     """The frames of a log file as an iterable. Each iteration reads the file from the beginning.
 
     Attributes:
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
 
     Raises:
         OSError: the file cannot be read. The iteration raises it.

@@ -45,13 +45,14 @@ class LogWriter(Protocol):
 class TextBlock(Protocol):
     """A block of many frames that a log writer can write as text at once.
 
-    Columns of frames, in `column_text`, implement this protocol.
+    Columns of frames, in `column_text`, implement this protocol. The time may decrease from one
+    frame of the block to the next.
 
     Attributes:
-        first_us: time of the first frame.
-        last_us: time of the last frame.
-        earliest_us: least time of a frame.
-        latest_us: greatest time of a frame.
+        first_us: time of the frame at the start of the block.
+        last_us: time of the frame at the end of the block.
+        earliest_us: least time of all frames of the block.
+        latest_us: greatest time of all frames of the block.
         errors: whether the block contains error frames.
     """
 

@@ -198,7 +198,7 @@ class _PcapngReader:
 
     Args:
         name: name of the file.
-        tally: counts of items that are not frames.
+        tally: counts of items that were not returned as frames, such as unreadable frames.
         marks: whether to return marks among the frames. The comment of a frame is a mark before the
             frame.
     """
@@ -557,7 +557,8 @@ class PcapngWriter:
     def close(self) -> None:
         """Complete the capture.
 
-        Marks after the last frame are stored in the statistics of the first bus.
+        A mark is an event among the frames, such as lost frames. Marks after the last frame are
+        stored as comments in a statistics block.
         """
         if self._file.closed:
             return

@@ -98,9 +98,9 @@ def _name(channel: str) -> str:
 class TraceLogReader:
     """Reader of the CAN frames in a trace file of the test bench.
 
-    If the trace was recorded at the devices, the reader returns the frames in the order in which
-    they were sent or first received. A frame of the host that several nodes received is returned
-    once.
+    A trace that was recorded at the devices may contain a frame once for each device. The reader
+    returns such a frame once. A frame of a device is returned when the device sent it. A frame of
+    the host is returned when the first device received it.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

@@ -120,7 +120,10 @@ class RecordingPlan:
         return self.path.with_name(f"{self._stem}-{number:05d}{self._ending}")
 
     def number(self, name: str) -> int:
-        """Return the number of the part with this file name, or 0 if the file is not a part."""
+        """Return the number of a part of the recording by its file name.
+
+        The result is 0 if the file is not a part of the recording.
+        """
         pattern = rf"{re.escape(self._stem)}-([0-9]{{5,9}}){re.escape(self._ending)}"
         match = re.fullmatch(pattern, name)
         return int(match[1]) if match else 0
