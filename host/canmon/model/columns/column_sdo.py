@@ -212,10 +212,10 @@ class _Frames(NamedTuple):
         Args:
             frames: frames of the bus.
             rows: rows of the SDO frames in `frames`.
-            places: for each row of `frames`, the row of the same frame in the block with the frames
-                of all buses.
-            side: for each row of `frames`, the SDO channel, the node-ID, and whether the client
-                sent the frame.
+            places: one value for each row of `frames`: the row of the same frame in the block with
+                the frames of all buses.
+            side: SDO channel, node-ID, and whether the client sent the frame. Each has one value
+                for each row of `frames`.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]
@@ -301,7 +301,7 @@ class ColumnSdo:
             frames: frames of the bus in the block.
             speakers: senders of the SDO frames. Each sender has three values: the SDO channel,
                 whether the sender is the client, and the rows of its frames in `frames`.
-            places: for each row of `frames`, the index of its text in `texts`.
+            places: one value for each row of `frames`: the index of its text in `texts`.
             texts: texts of the block. The method adds the meanings to them.
         """
         known = self._bus.version
