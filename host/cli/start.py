@@ -212,10 +212,9 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise an error again if it came from writing standard output. Otherwise do nothing.
+    """Raise an error again if it came from writing standard output. Otherwise, return.
 
-    If this function returns, the caller must report the error. If the reader has closed the pipe,
-    as `| head` does, the command ends without a message.
+    If this function returns, the caller must report the error.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]

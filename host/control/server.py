@@ -94,12 +94,12 @@ class LineServer:
         self._attached: dict[_Readable, Callable[[], None]] = {}
 
     def attach(self, source: _Readable, ready: Callable[[], None]) -> None:
-        """Also wait for another source in `serve`, and call a function when it can be read.
+        """Make `serve` also wait for another source, and call a function when the source has data.
 
         Args:
             source: object with a file descriptor. A descriptor of -1 shows that the source is
                 closed.
-            ready: function that is called when there is data to read.
+            ready: function that `serve` calls when there is data to read.
         """
         self._attached[source] = ready
 

@@ -40,7 +40,11 @@ class EchoFilter:
                 self.take(frame)
 
     def take(self, frame: CanFrame) -> bool:
-        """Return whether a received frame is the echo of a sent one. Each echo counts once."""
+        """Return whether a received frame is the echo of a sent frame.
+
+        Each sent frame has one echo. If a frame was sent once and is received twice, the result is
+        True for the first and False for the second.
+        """
         if frame not in self._awaited:
             return False
         times = self._awaited[frame]
@@ -91,5 +95,8 @@ class EchoFreeLink:
 
 
 def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
-    """Return a link that drops the echo of its own frames: the given link if there is no echo."""
+    """Return a link that does not return the echo of the frames it has sent.
+
+    If the interface has no echo, the result is the given link.
+    """
     return EchoFreeLink(link) if interface in ECHOING else link

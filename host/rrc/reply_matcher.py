@@ -172,11 +172,11 @@ class _UnconfirmedCommands:
     def carried_out(self, name: str) -> Command | None:
         """Process an OK to a command with this name.
 
-        Several commands with the same name may wait for an answer. The OK confirms the oldest one,
-        which is removed.
+        Several commands with the same name may wait for an answer. The OK belongs to the oldest of
+        these commands, which is removed.
 
         Returns:
-            The command with this name that was sent last. The RRC executes it last, so its values
+            The newest of these commands. The RRC executes the newest command last, so its values
             will apply. None if no command with this name is waiting.
         """
         same = [sent for sent in self._sent if sent.name == name]

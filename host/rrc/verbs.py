@@ -39,10 +39,10 @@ _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """Record of a received signal. Loops check this record and end after a signal.
+    """Record of a signal such as SIGINT. Loops check this record and end after a signal.
 
     Attributes:
-        number: number of the first signal, or 0 if no signal was received.
+        number: number of the first signal that the process received, or 0 if it received none.
     """
 
     number = 0
@@ -59,13 +59,14 @@ def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
     At the end, the chair is stopped.
 
     Args:
-        ended: object that records the signals.
+        ended: object that records signals such as SIGINT.
         stable: whether to switch stablemode on, unless an option of the command line prevents it.
 
     Raises:
         click.ClickException: the command failed. The message is one line, and the exit status is 1
             or 3.
-        KeyboardInterrupt: a signal was received. The error is raised after the chair was stopped.
+        KeyboardInterrupt: the process received a signal. The error is raised after the chair was
+            stopped.
     """
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None

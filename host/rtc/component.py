@@ -154,7 +154,7 @@ class ComponentAction:
         return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Do the work of a period of `ec` while the component is in the Error state.
+        """Do the work of a period of the execution context `ec`, in the state Error.
 
         The return value is ignored.
         """
@@ -376,7 +376,7 @@ class _Participant:
             self.wanted = _ERROR
 
     def notify(self, callback: _Callback) -> ReturnCode:
-        """Run a callback of the component and return its code.
+        """Run a callback of the component, and return the code that the callback returned.
 
         If the callback fails, the component moves to Error at the beginning of the next period.
         """
@@ -477,8 +477,8 @@ class ExecutionContexts:
 
     Attributes:
         quiet_us: time in us of the latest tick in which no context was due. In such a tick the
-            group does not call its contexts. Therefore the `now_us` of a context reads this
-            attribute.
+            group does not call its contexts, so the contexts cannot store the time. The `now_us` of
+            a context reads the time from here.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")

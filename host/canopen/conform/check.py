@@ -86,11 +86,13 @@ class Forget:
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """Step that calls the stimulus to set an input, compare an output, or switch the power.
+    """Step that calls the stimulus function, which operates the device from outside.
+
+    The function sets an input, compares an output, or switches the power.
 
     Attributes:
-        words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
-        within_ms: time limit of the stimulus in milliseconds, or None for no limit. If the stimulus
+        words: arguments of the function, such as `input`, `6000:01`, `01`.
+        within_ms: time limit of the function in milliseconds, or None for no limit. If the function
             takes longer, the check is inconclusive.
     """
 

@@ -111,8 +111,9 @@ class _StrayHeartbeat:
     def look_again(self) -> None:
         """After the run, check whether the node still sends the heartbeat that it sent before.
 
-        Only a heartbeat that object 1017h does not enable is checked. The tester cannot switch on
-        such a heartbeat. If it is missing now, `unrestored` becomes a text that reports it.
+        The check is done only if the node sent a heartbeat before the run although object 1017h did
+        not enable one. If this heartbeat is missing now, `unrestored` becomes a text that reports
+        it.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:

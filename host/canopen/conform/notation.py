@@ -244,10 +244,10 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return a step as text, for the beginning of the message that the step has failed.
+    """Return the text of a failed step. The error message of the step begins with this text.
 
-    The text does not contain the expected abort codes. For a step about frames, the text is empty,
-    because the message contains the expected frames.
+    The text does not contain the expected abort codes. If the step only sends, expects or drops
+    frames, or waits, the text is empty.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():

@@ -347,10 +347,10 @@ class Subject:
     refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
-        """Return the reason why a missing object prevents a check, or None if no object is missing.
+        """Return the reason if a missing object prevents a check. Otherwise, return None.
 
-        If the node lacks a mandatory object, only one check fails. For the object 1000h, this is
-        the check UE-01. Other checks that need the object get a reason here. They are not executed.
+        For each mandatory object, there is one check that is executed even if the object is
+        missing. This check then fails. For the object 1000h, it is the check UE-01.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"

@@ -58,7 +58,11 @@ def is_standard(at: Address, value: bytes) -> bool:
 
 
 def is_too_long(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects needs more bytes than it may have."""
+    """Return whether a value does not fit into the length that CiA 301 defines for its object.
+
+    A longer value fits if its additional bytes are 0. Only COB-IDs and the numbers of mapped
+    objects are checked. For other objects, the result is False.
+    """
     return bool((size := _bytes_of(at)) and value[size:].strip(b"\0"))
 
 

@@ -373,7 +373,8 @@ class BootOutcome:
     """Result of the boot-up of a slave.
 
     Attributes:
-        status: error status of the boot-up (CiA 302-2), which also stands for success.
+        status: `BootStatus.BOOTED` if the boot-up succeeded. Otherwise, the error status (CiA
+            302-2).
         state: last NMT state that the slave has reported, or None if it has reported none.
     """
 

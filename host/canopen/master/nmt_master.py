@@ -56,8 +56,9 @@ class ProcessData:
     def tick(self, now_us: int, *, sync: bool) -> None:
         """Read and write the drives whose period begins now.
 
-        No period begins before the slaves have booted for the first time. This behaviour is as in
-        ros2_canopen, whose drivers wait for the slaves.
+        A drive is read and written once in each period. The period is a fixed time, or the time
+        from one SYNC to the next. No period begins before the slaves have booted for the first
+        time.
 
         Args:
             now_us: current time in microseconds.

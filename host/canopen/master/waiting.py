@@ -78,8 +78,8 @@ def perform(
     """Run several operations of drives in parallel, until all have ended.
 
     Raises:
-        DriveFailed: a condition for which an operation waits did not hold in time. The other
-            operations stop where they are.
+        DriveFailed: an operation exceeded its time limit, or cannot be done. The other operations
+            stop where they are.
     """
     waits = [_Wait(operation, now_us()) for operation in operations]
     while waits := [wait for wait in waits if wait.step is not None]:

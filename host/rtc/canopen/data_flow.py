@@ -58,10 +58,9 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Keep the tables of PDOs and ports up to date for a new proxy.
+        """Call `route` now, and whenever an InPort of a new proxy gets or loses a connector.
 
-        `route` rebuilds the tables now, and whenever an InPort of the proxy gets or loses a
-        connector.
+        The method `route` rebuilds the tables of PDOs and ports.
         """
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:

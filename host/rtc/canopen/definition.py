@@ -79,7 +79,7 @@ class PdoName:
 
 @dataclass(frozen=True, slots=True)
 class BusEntry:
-    """The CAN bus in a System Definition, as python-can selects it.
+    """Settings in a System Definition with which python-can opens the CAN bus.
 
     If an attribute is None, the command line gives its value.
 
@@ -169,7 +169,7 @@ class NodeEntry:
         role: type of the device: DeviceRTC, CiA 402 drive, or other CANopen device.
         heartbeat_ms: producer heartbeat time of the node.
         ports: names of ports by PDO. The key for the second TPDO is `tpdo2`.
-        pdos: parameters that are written into PDOs, by PDO.
+        pdos: settings that the server writes to the node for its PDOs. The keys are as in `ports`.
         restart: maximum number of times in a row that the server restarts the node after its loss.
         sdo_ports: ports of objects that are transferred by SDO, by name.
     """

@@ -75,8 +75,8 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
             are no devices. Afterwards, do not use this server for anything else.
 
     Returns:
-        A text for each setting that a node will refuse, and a text for each COB-ID with which
-        several nodes send a PDO, although no node refuses this.
+        A text for each error. An error is a setting that a node will refuse, or a COB-ID with which
+        several nodes send a PDO.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():
@@ -143,8 +143,8 @@ def draw_graph(server: RtcCanopenServer) -> str:
     Connections through the PC are solid, and PDO links are dashed.
 
     Args:
-        server: server of the system. Afterwards, do not use this server for anything else, because
-            `check_offline` has changed it.
+        server: server that has the System Definition. This function changes the server by a call of
+            `check_offline`. Afterwards, do not use the server for anything else.
     """
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}

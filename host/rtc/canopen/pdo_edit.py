@@ -187,9 +187,9 @@ Pdos = Mapping[int, PdoDescription]
 
 
 def read_pdos(file: definition.DeviceFile) -> Script[Pdos]:
-    """Script that reads from a node all its PDOs that can be edited.
+    """Script that reads the PDOs of a node, for the PDO editor.
 
-    Multiplexed PDOs and PDOs with a 29-bit CAN-ID are left out.
+    It leaves out PDOs that cannot be edited: multiplexed PDOs, and PDOs with a 29-bit CAN-ID.
     """
     found = {}
     for index in file.pdos:

@@ -110,7 +110,10 @@ class PdoSink:
         self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
 
     def preset(self, index: int, value: Value) -> None:
-        """Set the value that frames contain for an object until its port gets a value."""
+        """Set the initial value of an object.
+
+        The frames contain this value until a value arrives at the InPort of the object.
+        """
         for place, field in enumerate(self.layout.fields):
             if field.mapped.index == index:
                 self._latest[place] = value

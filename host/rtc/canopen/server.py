@@ -117,7 +117,8 @@ class ServerObjects:
     def answer(self, data: bytes) -> bytes | None:
         """Return the SDO response to a request.
 
-        If the data are an abort, or no SDO request, the result is None.
+        If the data contain an SDO abort, or anything else that is not an SDO request, the result is
+        None.
         """
         try:
             request = sdo.parse_request(data)

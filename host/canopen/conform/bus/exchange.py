@@ -345,8 +345,8 @@ class BusExchange:
         """Detect other nodes only by their heartbeat from now on.
 
         Before this call, each frame with a CAN-ID of another node shows that this node exists.
-        Later, checks may cause the node under test to send such frames, so that only heartbeats are
-        certain.
+        During the checks, the node under test may send such frames itself, so they no longer show
+        this.
         """
         self._others_by = _HEARTBEATS
 

@@ -56,9 +56,9 @@ _HINTS: Final[Mapping[str, str]] = {
 
 
 def hint(result: Result) -> str:
-    """Return a hint where the cause of a failure may be, or an empty text without a hint.
+    """Return a hint that helps to find the cause of a failure.
 
-    The text has no full stop at its end.
+    If there is no hint for the failure, the result is empty. A hint has no full stop at its end.
     """
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:

@@ -55,7 +55,8 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
     """Find objects whose SubNumber differs from the number of their sub-index sections.
 
-    If a sub-index seems to be missing, SubNumber is not corrected, so that the error stays visible.
+    Each finding contains an edit that corrects SubNumber. If a sub-index seems to be missing, the
+    finding contains no edit.
     """
     file = document.file
     for section, index, sub in file.objects():

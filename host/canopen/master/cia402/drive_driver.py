@@ -208,7 +208,7 @@ class DriveDriver:
     def state(self) -> DriveState | None:
         """State of the drive (CiA 402) in its last statusword.
 
-        The state is None as long as no statusword has arrived since the node booted or was lost.
+        After the node has booted or was lost, the state is None until the next statusword arrives.
         """
         return state_of(self.statusword) if self._known else None
 

@@ -169,9 +169,9 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Open the log file, and yield the function that writes a server event to it.
+    """Open the log file, and yield one function, which writes a server event to this file.
 
-    Nothing is yielded if `log` is None.
+    If `log` is None, the iterator is empty.
     """
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
