@@ -381,7 +381,7 @@ class FramedApp(App[None]):
 
     @contextmanager
     def ended_by_signals(self) -> Iterator[None]:
-        """Context manager in which a signal ends only the app; the code after it still runs."""
+        """Context manager in which a signal such as SIGTERM ends the app, but not the process."""
         with stopped_by_signals(self.end):
             yield
 

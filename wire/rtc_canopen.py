@@ -165,9 +165,10 @@ _INTEGERS: Final = {8: DataType.INTEGER8, 16: DataType.INTEGER16, 32: DataType.I
 
 
 def integer(word_bits: int) -> CanopenPortType[int]:
-    """Return the port type Integer of a device, whose size is the word size of its processor.
+    """Return the port type Integer for a device whose processor has the given word size.
 
-    See the NEDO report, 3.4.43.3, Table 4, note 1.
+    A value of this type has as many bits as a word of the processor. See the NEDO report, 3.4.43.3,
+    Table 4, note 1.
 
     Args:
         word_bits: word size in bits.

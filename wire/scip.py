@@ -1,6 +1,6 @@
 r"""SCIP of scanning range finders: commands, replies, scans, descriptions; 2.0 and 1.1.
 
-Numbers as characters of 6 bits each, and the sum after each line (SCIP 2.0, data encoding).
+Numbers as characters of 6 bits each, and the checksum after each line (SCIP 2.0, data encoding).
 
 >>> encode_number(1_234, 2), encode_number(5_432, 3), encode_number(16_000_000, 4)
 (b'CB', b'1Dh', b'm2@0')
@@ -14,14 +14,14 @@ Command(symbol='GD', parameters='0044072501', string=';left')
 >>> Command("TM", "0").encode()
 b'TM0\n'
 
-The data of a scan: time stamp, and distances in blocks of 64 characters, each with its sum.
+The data of a scan: time stamp, and distances in blocks of 64 characters, each with its checksum.
 
 >>> encode_scan(16_000_000, [5_432], 3)
 (b'm2@0?', b'1DhM')
 >>> parse_scan((b'm2@0?', b'1DhM'), 3)
 (16000000, (5432,))
 
-SCIP 1.1, the protocol of a URG-04LX after power-up. SCIP 1.1 has no sums. A status has one
+SCIP 1.1, the protocol of a URG-04LX after power-up. SCIP 1.1 has no checksums. A status has one
 character, and a distance has two.
 
 Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
@@ -153,7 +153,7 @@ def parse_number(data: bytes) -> int:
 
 
 def _line_sum(data: bytes) -> bytes:
-    """Return the sum character of a line."""
+    """Return the checksum character of a line."""
     return bytes((_ZERO + (sum(data) & _MASK),))
 
 
@@ -162,16 +162,16 @@ def with_sum(line: bytes, summed: bytes | None = None) -> bytes:
 
     Args:
         line: the line.
-        summed: text over which the sum is computed, or None for the whole line.
+        summed: text over which the checksum is computed, or None for the whole line.
     """
     return line + _line_sum(line if summed is None else summed)
 
 
 def without_sum(line: bytes) -> bytes:
-    """Return a line without its sum.
+    """Return a line without its checksum.
 
     Raises:
-        ChecksumError: the sum does not match.
+        ChecksumError: the checksum is wrong.
     """
     data, came = line[:-1], line[-1:]
     if not came or came != _line_sum(data):
@@ -275,7 +275,7 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
         width: number of characters of a distance.
 
     Raises:
-        ChecksumError: the sum of a line is wrong.
+        ChecksumError: the checksum of a line is wrong.
         FramingError: there is no time stamp, or a distance is incomplete.
         FieldError: a character is invalid.
     """
@@ -306,7 +306,7 @@ def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> byt
 
 
 def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
-    """Return the data lines of the answer to a G command of SCIP 1.1, which have no sums.
+    """Return the data lines of the answer to a G command of SCIP 1.1, without checksums.
 
     Raises:
         FieldError: a distance does not fit into its characters.
@@ -329,7 +329,7 @@ class Reply:
         echo: command that is answered. In replies with scans it contains the number of remaining
             scans.
         status: status of two characters.
-        lines: lines after the status, as received, each with its sum.
+        lines: lines after the status, as received, each with its checksum.
     """
 
     echo: bytes
@@ -350,7 +350,7 @@ class Reply:
 
         Raises:
             FramingError: there is no echo or no status.
-            ChecksumError: the sum of the status does not match.
+            ChecksumError: the checksum of the status is wrong.
         """
         echo, *rest = data.split(b"\n")
         if not rest:
@@ -394,23 +394,23 @@ class ReplySplitter:
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
-    """Return `KEY:VALUE;` lines with their sums, as in the replies to VV, PP and II.
+    """Return `KEY:VALUE;` lines with checksums, as in the replies to the commands VV, PP and II.
 
-    The sum of a line does not include the semicolon.
+    The checksum of a line does not include the semicolon.
     """
     texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
     return tuple(with_sum(text + b";", text) for text in texts)
 
 
 def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
-    """Read `KEY:VALUE;` lines with their sums, as in the replies to VV, PP and II.
+    """Read `KEY:VALUE;` lines with checksums, as in the replies to the commands VV, PP and II.
 
     Returns:
         The values by key.
 
     Raises:
         FramingError: a line is invalid.
-        ChecksumError: the sum of a line is wrong.
+        ChecksumError: the checksum of a line is wrong.
     """
     values = {}
     for line in lines:

@@ -122,8 +122,8 @@ def parse_line(line: bytes) -> UcodeLine:
 
     Raises:
         FramingError: the line does not have the form of a reader's line.
-        ChecksumError: the sum is wrong.
-        FieldError: the fields do not fit the kind.
+        ChecksumError: the CRC is wrong.
+        FieldError: the type of the line is unknown, or the fields do not fit the type.
     """
     if (match := _LINE.fullmatch(line)) is None:
         raise FramingError(f"no line of a ucode reader: {line[:60]!r}")

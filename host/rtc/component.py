@@ -376,7 +376,7 @@ class _Participant:
             self.wanted = _ERROR
 
     def notify(self, callback: _Callback) -> ReturnCode:
-        """Run a callback of the component, and return the code that the callback returned.
+        """Run a callback of the component, and return the return code of the callback.
 
         If the callback fails, the component moves to Error at the beginning of the next period.
         """

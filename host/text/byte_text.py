@@ -32,7 +32,7 @@ def escape(data: bytes) -> str:
 
 
 def unescape(text: str) -> bytes:
-    r"""Return the bytes that a text of `escape` stands for.
+    r"""Return the bytes from which `escape` has made a text.
 
     Raises:
         ValueError: the text contains a character or an escape that `escape` never writes.

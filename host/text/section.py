@@ -256,7 +256,10 @@ class Notes:
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return the beginning of an error message: the keys as in the file, and a colon."""
+        """Return the beginning of an error message: the keys of the invalid value, and a colon.
+
+        Example: `step[1].send:`. If `names` contains a text for the keys, this text replaces them.
+        """
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property

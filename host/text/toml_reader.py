@@ -64,7 +64,10 @@ class TomlDocument:
     whole: bool = True
 
     def line_of(self, path: Sequence[str | int]) -> int:
-        """Return the line of a value, or of the value that contains it if its line is unknown.
+        """Return the number of the line that contains a value.
+
+        If this line is unknown, the result is the line of the table or array that contains the
+        value.
 
         Args:
             path: keys and indices from the top to the value.
@@ -106,7 +109,7 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table with the given key inside this table, for a header such as `[key.b]`.
+        """Return the table that this table has at a key. A header `[key.b]` needs it.
 
         A missing table is created. If the key has an array of tables, the last table of the array
         is returned.
@@ -122,7 +125,9 @@ class _Table:
         return node
 
     def open(self, line: int, key: str) -> _Table:
-        """Start the table of a header `[key]`.
+        """Return the table in which the lines after a header `[key]` are stored.
+
+        A missing table is created.
 
         Raises:
             _TakenError: the key already has a value or a header.
@@ -144,7 +149,7 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table with the given key inside this table, for a line such as `key.b = 1`.
+        """Return the table that this table has at a key. A line `key.b = 1` needs it.
 
         A missing table is created.
 

@@ -97,11 +97,11 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Context manager that yields a temporary path for new content, which then replaces a file.
+    """Context manager that replaces a file. It yields a temporary path for the new content.
 
-    The temporary file has the same name as the file, in a new folder next to it. It replaces the
-    file at the end of the block. If the file is not a regular file, for example a pipe, its own
-    path is yielded.
+    The temporary file has the name of the old file, and is in a new folder next to the old file. At
+    the end of the block, the temporary file replaces the old file. A file that is not regular, such
+    as a pipe, is not replaced. In this case, the path of this file is yielded.
 
     Raises:
         OSError: the file cannot be written, or the code in the `with` block has raised an OSError.

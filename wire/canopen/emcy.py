@@ -116,7 +116,8 @@ _OF_DRIVES: Final = {
 def describe(code: int) -> str:
     """Return the text of an emergency error code, or of its class.
 
-    If CiA 301 has only a class for a code, and CiA 402 has a text, the text names CiA 402.
+    For some codes, CiA 301 defines only a class, and CiA 402 (drives) defines the code itself. The
+    result is then the text of CiA 402, with `(CiA 402)` at its end.
 
     >>> describe(0xFF01), describe(0x4711), describe(0x0001)
     ('CANopen device specific, generic error', 'temperature, generic error', 'unknown')

@@ -147,9 +147,9 @@ class Scanned:
 class Dispatched:
     """An entry of an object dispatching list (from 1FD0h on), for data from another node.
 
-    The other node (the producer) sends the data by MPDO in source address mode (SAM). The entry
-    tells this node (the consumer) in which of its objects it stores the data of an object of the
-    producer. See CiA 301, object dispatching list.
+    The other node (the producer) sends the value of one of its objects by MPDO in source address
+    mode (SAM). This node (the consumer) stores the value in one of its own objects. The entry
+    assigns the producer's object to the consumer's object. See CiA 301, object dispatching list.
 
     Attributes:
         node_id: node-ID of the producer.

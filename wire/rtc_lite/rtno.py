@@ -69,16 +69,16 @@ def encode_request(frame: LiteFrame) -> bytes:
     """Return an RTC-Lite request as a packet of RTno, a similar protocol for small controllers.
 
     Raises:
-        KeyError: RTno has no letter for the request.
+        KeyError: RTno has no code letter for the request.
     """
     return pack(LETTERS[frame.command], frame.data)
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Return an RTC-Lite frame of a device as a packet of RTno.
+    """Return an RTC-Lite frame of a device as a packet of RTno, a similar protocol.
 
     Raises:
-        KeyError: RTno has no letter for the frame.
+        KeyError: RTno has no code letter for the command of the frame.
     """
     return pack(LETTERS[frame.command], _packet_data(frame))
 

@@ -27,14 +27,16 @@ def engines_joined(
     *,
     fixed: bool = False,
 ) -> Iterator[None]:
-    """Context manager that connects a system with other systems by OpenRTM or ROS 2 (engines).
+    """Context manager that connects a system with other processes.
+
+    The code that connects by OpenRTM, and the code that connects by ROS 2, are called engines.
 
     Args:
         options: engines to use, with their settings.
         manager: manager of the system, which is not running yet.
-        attach: function that is called once with a `CallQueue`. In this queue, the engines store
-            their calls to the manager. The function must make the manager's thread execute these
-            calls.
+        attach: function that is called once with a `CallQueue`. The engines do not call the manager
+            directly. They put these calls into the queue. The function must make the manager's
+            thread execute these calls.
         stop: function that ends the command. It is called if another process requests the end.
         fixed: whether other processes must not create or end components of this system.
 

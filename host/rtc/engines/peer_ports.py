@@ -132,7 +132,7 @@ class PeerEnd:
         """Return the profile of the connector between a given local port and the other process.
 
         Raises:
-            RtcRefused: the port has a connector with this ID.
+            RtcRefused: the port already has a connector with the ID `connector_id`.
         """
         refuse_known_id(port, self.connector_id)
         data_type = {"dataport.data_type": port.data_type.idl_id()}
@@ -241,10 +241,10 @@ class _SendBuffer(RingBuffer[P]):
         return taken
 
     def put_back(self, value: P) -> None:
-        """Put a value that could not be sent back to the front of the buffer.
+        """Put an unsent value back at the front of the buffer.
 
-        If the buffer is full, one value is lost: with the policy OVERWRITE, the value that could
-        not be sent; with another policy, the newest value in the buffer.
+        If the buffer is full, one value is lost. With the policy OVERWRITE, this is the unsent
+        value. With another policy, it is the newest value in the buffer.
         """
         with self._lock:
             full = len(self._values) == self._options.length
@@ -265,9 +265,10 @@ class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> _P_co | None:
-        """Fetch the next value of the port in the other process, or return None without one.
+        """Fetch the next value of the port in the other process, or return None.
 
-        The call may wait up to a time-out. Any exception means that there was no answer.
+        The result is None if the port has no value. The call may wait up to a time-out. Any
+        exception means that the other process did not answer.
         """
         ...
 
@@ -516,10 +517,10 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         The value is sent later.
 
         Returns:
-            INVALID_ARGS if the value cannot be encoded, or the status of the buffer if the buffer
-            does not accept the value. Otherwise, the result of the latest value that was sent. This
-            is the status that the other process returned, such as PORT_OK or BUFFER_FULL, or
-            CONNECTION_LOST if the other process did not answer.
+            If the value cannot be encoded: INVALID_ARGS. If the buffer does not accept the value:
+            the status of the buffer. If the buffer accepts the value: the status of the value that
+            was sent last. The other process has returned this status, such as PORT_OK or
+            BUFFER_FULL. If the other process did not answer, the status is CONNECTION_LOST.
         """
         try:
             payload = self._codec.encode(value)

@@ -103,7 +103,7 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
-        """Return the position in the form of phase 3, or None if a number is invalid.
+        """Return the position in the data type of IIS phase 3, or None if a number is invalid.
 
         The heading of the result is in 0..2 pi.
         """
@@ -119,7 +119,7 @@ class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
-        """Return the position in the form of phase 2, or None if a number is invalid.
+        """Return the position in the data type of IIS phase 2, or None if a number is invalid.
 
         The heading of the result is in 0..2 pi.
         """

@@ -38,8 +38,8 @@ class Umbmark:
     def most_m(self) -> float:
         """The systematic error of the odometry in m (E_max,syst).
 
-        The errors of all runs in one direction are averaged, and the length of the mean is taken in
-        m. The result is the larger one of the lengths for the two directions.
+        For each of the two directions, the errors of all runs are averaged. The two mean errors are
+        vectors (x, y). The result is the length of the longer vector.
         """
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 

@@ -196,10 +196,9 @@ class _Publisher(Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `take` will return values.
 
-        If no value waits, the time is `NEVER`. If a value waits, the time depends on the
-        subscription type of the connector. With `new`, the time is 0, which means at once. With
-        `periodic`, the next tick plans the push. Before this tick the time is 0. After this tick
-        the time is the planned time.
+        If no value waits, the time is `NEVER`. If a value waits, the time is 0, which means at
+        once. With the subscription type `periodic`, the next call of `take` replaces the 0 by the
+        time at which the next period begins.
         """
         if not len(self._values):
             return NEVER
@@ -272,15 +271,14 @@ class Connector(ConnectorBase, Generic[T]):
     def due_us(self) -> int:
         """Time in us at which `tick` will push values to the InPort.
 
-        If no value waits, the time is `NEVER`. If a value waits, the time depends on the
-        subscription type of the connector. With `new`, the time is 0, which means at once. With
-        `periodic`, the next tick plans the push. Before this tick the time is 0. After this tick
-        the time is the planned time.
+        If no value waits, the time is `NEVER`. If a value waits, the time is 0, which means at
+        once. With the subscription type `periodic`, the next tick replaces the 0 by the time at
+        which the next period begins.
         """
         return self._publisher.due_us if self._publisher else NEVER
 
     def write(self, value: T) -> PortStatus:
-        """Put a value that the OutPort writes into a buffer of the connector.
+        """Put a value of the OutPort into a buffer of the connector.
 
         Returns:
             The status of the buffer, such as PORT_OK. With the interface type `corba_cdr`, the

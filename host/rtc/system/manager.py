@@ -503,7 +503,7 @@ class Manager(Schedule):
         self._request("reset", ExecutionContext.reset_component, names)
 
     def free_name(self, type_name: str) -> str:
-        """Return an instance name for a new component that no other component has.
+        """Return an instance name for a new component. No other component has this name.
 
         Args:
             type_name: type name of the component, with which the instance name begins.

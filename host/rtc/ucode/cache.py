@@ -153,7 +153,7 @@ class LookupCache(Generic[_V]):
 
         Args:
             address: address to look up.
-            source: source of the texts.
+            source: source of values that are not in the cache.
             limits: settings of the cache.
             now_us: present time in us.
         """

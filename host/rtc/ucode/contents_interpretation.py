@@ -41,6 +41,8 @@ class Contents:
 class ContentsInterpretation(Lookup[Contents]):
     """Component that fetches the information about ucode markers: positions and properties.
 
+    A ucode is an identifier of 128 bits, and a ucode marker is an object that carries it.
+
     The ports are:
 
     - `addresses` in, as `UcodeSettlement` writes them
@@ -48,7 +50,7 @@ class ContentsInterpretation(Lookup[Contents]):
     - `place` out: the ucode, then `name=value` of each property
 
     The information at an address is a JSON object with the numbers `x_m` and `y_m`. Its other
-    members are properties. tickrig has defined the ports and the JSON object.
+    members are properties.
 
     Args:
         instance_name: name of the component.

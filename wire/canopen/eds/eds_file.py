@@ -52,7 +52,8 @@ class Finding(NamedTuple):
     Attributes:
         file: name of the file.
         section: name of the section without brackets, or empty for the file as a whole.
-        reason: text with the key or line, its text, and the allowed or used value.
+        reason: description of the error. It contains the key or line of the file, and the value
+            that is allowed or that is used instead.
         line: line number, or 0 for the file as a whole.
         rule: name of the violated rule of `canmon eds check`, or empty if there is none.
     """

@@ -155,13 +155,14 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve a CORBA object for the other process, if the other process makes the calls.
+        """Serve the CORBA objects of this end that the other process will call, if there are any.
 
         Args:
             values: properties of the connector.
 
         Returns:
-            Properties that tell the other process where the object is.
+            Properties that tell the other process where the objects are. They are empty if no
+            object is served.
 
         Raises:
             RtcRefused: the properties are invalid.

@@ -154,13 +154,14 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Prepare to end a connection, because the peer or a tool has requested this.
+        """Prepare the end of a connector, because the other process or a tool has requested it.
 
-        The peer will not be notified of the end of the connection.
+        The other process will not be notified when the connector ends.
 
         Returns:
-            The first value is the connection to a peer, or None if no such connection has this ID.
-            The second value is whether a connector with this ID exists or has just ended.
+            The first value is the object for a connector to another process, or None if no such
+            connector has this ID. The second value is False if the ID is unknown. An ID is known if
+            a connector of the port has it, or if a connector with this ID has just ended.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -329,7 +330,10 @@ class _PortAnswers:
         return next((code for code in codes if code != _code(_OK)), _code(_OK))
 
     def notify_disconnect(self, connector_id: str) -> Any:
-        """End a connector of the local port, and request the same from the next port."""
+        """End a connector of the local port.
+
+        If the local port is the first port of the connector, it also notifies the second port.
+        """
         connection, known = self._calls.call(partial(self._connections.look, connector_id))
         if not known:
             return _code(ReturnCode.BAD_PARAMETER)

@@ -98,11 +98,12 @@ class OmniTo2WD(RtComponent):
 
 
 def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
-    """Plan a path as turns on the spot and straight lines, and return the poses at their ends.
+    """Plan a path of turns on the spot and straight lines, and return it as a list of poses.
 
     The list begins with the start. Each point of the path adds two poses. The first is the previous
     position, with the heading towards the point. The second is the point, with the same heading.
-    The list ends with the last point in its wanted heading (RH3 specification, path calculation).
+    The last pose of the list is the last point, with the heading that is given for this point (RH3
+    specification, path calculation).
 
     >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]
     [(0.0, 0.0, 0.0), (0.0, 0.0, 1.57), (0.0, 2.0, 1.57), (0.0, 2.0, 0.0)]
