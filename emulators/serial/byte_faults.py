@@ -289,7 +289,11 @@ def _read_keep(word: str) -> tuple[int, bool]:
 
 
 _KEEP: Final = FaultArgument(
-    "keep", "what is left of it", "half", "half, bytes or 0% to 100%", read=_read_keep
+    "keep",
+    "what is left of it",
+    "half",
+    "half, a number of bytes or a share such as 30%",
+    read=_read_keep,
 )
 _BYTES: Final = FaultArgument("bytes", "how many", "1", "bytes", 1, 4_096)
 _PIECES: Final = FaultArgument("pieces", "how many", "2", "pieces", 2, 4_096)
