@@ -220,6 +220,7 @@ class RuleDemand:
         timed: whether the demand is about time. Such a demand judges nothing if all frames have the
             same time.
         doubt: reason that is reported if nothing was judged.
+        forbids: whether the demand forbids what the rule names, so that it need not occur.
     """
 
     due_us: int = NEVER
@@ -227,6 +228,7 @@ class RuleDemand:
     judged: bool = False
     timed: bool = False
     doubt: str = "no frame came while it was in force"
+    forbids: bool = False
 
     def begin(self, at_us: int) -> None:
         """Start, also after a pause."""
@@ -285,6 +287,7 @@ class Truth(RuleDemand):
         self._at_frames, self._wrong = event.at_frames, set[_Sender]()
         self._each = self._at_frames is not None and self._at_frames.each
         self._alone = None if wanted else event.alone
+        self.forbids = not wanted
         # without the event, too, it is judged: misspelt signals are reported by the rule
         forbids_frames = not wanted and (self._each or event.alone is not None)
         self._proves = forbids_frames or all(map(AtFrames.is_event_signal, event.paths))

@@ -243,8 +243,8 @@ class ExpressionRule:
         """
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
-            away = {} if self._forced or not self._scopes else dict(self._slices)
-            missing = [path for path in self._missing.paths if path not in away]
+            forbidden = dict(self._slices) if self._demand.forbids else ()  # these need not come
+            missing = [path for path in self._missing.paths if path not in forbidden]
             texts = [f"no signal {path} came{self._near(path)}" for path in missing]
             texts += [f"no frame with {word} came" for word in self._missing.words]
         hint = "" if self._demand.came or not self._unmapped else _NO_MAPPING
@@ -287,10 +287,6 @@ class ExpressionRule:
 
     def _near(self, path: str) -> str:
         _, name, _ = filters.signal_place(path)
-        if path in dict(self._slices) and not self._scopes:
-            return (
-                f"; if this frame may be missing, end the rule with: after {path.partition('[')[0]}"
-            )
         near = closest(name, [*filters.KINDS, *sorted(self._names)])
         return f"; did you mean {near[0]}?" if near and near[0] != name else ""
 
