@@ -128,7 +128,7 @@ class EmulatorControl(RequestDispatcher):
             ):
                 if members := device.inputs.groups.get(str(name)):
                     raise ValueError(f"{name} can only be set; read {', '.join(members)}")
-                hint = near(str(name), [*device.inputs.table, *device.outputs])
+                hint = near(str(name), [*device.outputs, *device.inputs.table])
                 raise ValueError(f"no input or output {short(name)}; {hint}")
         return {"values": {name: read_signal(device, name) for name in names}}
 

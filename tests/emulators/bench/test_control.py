@@ -123,7 +123,7 @@ def test_an_id_comes_back(emulator: Emulator) -> None:
         ({"v": 1, "do": ["get"]}, 'no request ["get"]; known'),
         ({"v": 1, "do": "get", "name": "x"}, 'get has no field "name"; fields: names'),
         ({"v": 1, "do": "get", "names": "x"}, 'names is a list of names, not "x"'),
-        ({"v": 1, "do": "get", "names": [[]]}, "no input or output []; known: lamp"),
+        ({"v": 1, "do": "get", "names": [[]]}, "no input or output []; known: state"),
         ({"v": 1, "do": "set", "name": "lamp"}, "value is a number or a string, not null"),
         ({"v": 1, "do": "set", "name": "lamp", "value": 1.5}, "lamp takes a whole number, not 1.5"),
         ({"v": 1, "do": "set", "name": "lamp", "value": True}, "a number or a string, not true"),

@@ -190,7 +190,7 @@ def test_each_mistake_at_the_control_socket_is_one_line(tmp_path: Path) -> None:
             (("fault", "cut@1s", "--for", "2s"), "Error: --for 2s: 'cut@1s' has times of its own"),
             (("fault", "flip=2"), "Error: flip takes a rate above 0 and up to 1"),
             (("clear", "x"), "Error: no fault 'x'; known: flip, drop, dup, cut, delay, "),
-            (("get", "x"), 'Error: no input or output "x"; known: rrc_power'),
+            (("get", "x"), 'Error: no input or output "x"; known: state'),
         ):
             result = child.ctl(*words)
             assert (result.exit_code, result.stdout) == (2, "")

@@ -142,7 +142,7 @@ def test_at_the_end_components_are_deactivated() -> None:
 @pytest.mark.parametrize(
     ("do", "fields", "error"),
     [
-        ("get", {"names": ["speed"]}, 'no input or output "speed"; known: reset'),
+        ("get", {"names": ["speed"]}, 'no input or output "speed"; known: state'),
         ("get", {"names": 1}, "names is a list of names, not 1"),
         ("set", {"name": "reset", "value": None}, "value is a number or a string, not null"),
         ("press", {"name": "power_cut"}, "no button 'power_cut'"),

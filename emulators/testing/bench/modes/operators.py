@@ -218,7 +218,7 @@ class _HumanOperator:
             return self._physical.inputs[name]
         output = self._physical.outputs.get(name)
         if output is None:
-            names = [*self._physical.inputs.table, *self._physical.outputs]
+            names = [*self._physical.outputs, *self._physical.inputs.table]
             raise ValueError(f"no input or output {name!r}; {near(name, names)}")
         unit = f" in {output.unit}" if output.unit else ""
         while True:
@@ -683,7 +683,7 @@ class Operators:
         assembly = self._like.state.assembly
         groups = assembly.inputs.groups
         if not (name in assembly.inputs.table or name in assembly.outputs or name in groups):
-            names = [*assembly.inputs.table, *assembly.outputs]
+            names = [*assembly.outputs, *assembly.inputs.table]
             raise ValueError(f"no input or output {name!r}; {near(name, names)}")
         alone = len(assembly.parts) == 1
         device = next(iter(self._plan.devices)) if alone else name.partition("/")[0]
