@@ -586,6 +586,20 @@ class BenchRig(RunningEmulator):
             faults,
         )
 
+    def is_ordered(self, order: FaultOrder) -> bool:
+        """Return whether a fault was requested, and not cancelled since."""
+        return any(each is order for each in self.orders)
+
+    def cancel(self, fault: str) -> None:
+        """Forget the requests of a fault that wait for a condition.
+
+        Args:
+            fault: full name of the fault.
+        """
+        self.orders[:] = [
+            order for order in self.orders if order.due_us is not None or order.spec.name != fault
+        ]
+
     def drop_unheard(self) -> None:
         """Discard received data of serial lines that no host has read."""
         for mount in self.state.mounts.values():

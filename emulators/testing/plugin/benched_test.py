@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from tickrig.emulators.testing.host_clock.host_code import HostTimeError, Unpatc
 from tickrig.emulators.testing.plugin import bench_source
 from tickrig.emulators.testing.plugin.bench_source import WarmUp, warmed
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
-from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
+from tickrig.emulators.testing.plugin.failure_report import faults_that_wait, keep, sections_of
 from tickrig.emulators.testing.plugin.health import (
     LONG_WAITS,
     THREADS,
@@ -211,6 +212,13 @@ class _BenchedTest(TestWithBench):
             text = "after the test the bench is not as it has to be:"
             pytest.fail("\n".join([text, *found]), pytrace=False)
         self._passed = True
+        for fault in faults_that_wait(bench):
+            warnings.warn_explicit(
+                f"a fault of this test never began: {fault}",
+                pytest.PytestWarning,
+                str(self.item.path),
+                (self.item.reportinfo()[1] or 0) + 1,
+            )
 
     def judge(
         self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool

@@ -80,7 +80,7 @@ class HardwareMode(BenchMode):
         self._terminal, self._begun_ns = terminal or Terminal(), time.monotonic_ns()
         like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
         super().__init__(like, plan.hardware.tolerance)
-        self._pace, self._pending = HostPace(), list[tuple[Condition, _Begin]]()
+        self._pace, self._pending = HostPace(), list[tuple[Condition, _Begin, FaultOrder]]()
         self._looking = self._begun = False
         mounts = like.state.mounts
         self._record = PortRecord(plan, mounts, lambda: self.now_us)
@@ -128,11 +128,13 @@ class HardwareMode(BenchMode):
         if condition is None:
             begin(self.now_us)
         else:
-            self._pending.append((condition, begin))
+            self._pending.append((condition, begin, order))
             self._look()
 
     def clear(self, owner: str, fault: str) -> None:
-        """Clear a fault by the operator."""
+        """Clear a fault by the operator, or cancel a fault that waits for its condition."""
+        self._rig.cancel(self._rig.state.full_fault_name(owner, fault))
+        self._pending = [entry for entry in self._pending if self._rig.is_ordered(entry[2])]
         self._operators.clear(owner, fault)
 
     def switch_power(self, owner: str, *, on: bool) -> None:
@@ -218,8 +220,8 @@ class HardwareMode(BenchMode):
         self._looking = True
         try:
             for entry in tuple(self._pending):
-                condition, begin = entry
-                if condition():
+                condition, begin, order = entry
+                if self._rig.is_ordered(order) and condition():
                     self._pending.remove(entry)
                     begin(self.now_us)
         finally:

@@ -287,7 +287,7 @@ class EmulatedMode(BenchMode):
 
     def clear(self, owner: str, fault: str) -> None:
         """Clear a fault, or cancel a scheduled fault."""
-        self.act(lambda rig: rig.operator.clear(rig.state.full_fault_name(owner, fault)))
+        self.act(lambda rig: _clear(rig, rig.state.full_fault_name(owner, fault)))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
         """Switch the supply of a device, or of all devices if `owner` is empty."""
@@ -315,12 +315,23 @@ def _arm(rig: BenchRig, order: FaultOrder, condition: Condition | None) -> None:
     """Start or schedule a fault."""
 
     def begin() -> None:
-        now_us = rig.effective_us
-        rig.operator.fault(now_us, order.begin(now_us))
+        if rig.is_ordered(order):
+            now_us = rig.effective_us
+            rig.operator.fault(now_us, order.begin(now_us))
 
     rig.operator.check_fault(order.spec)
-    if condition is None:
-        begin()
-    else:
-        when(rig, condition, begin)
     rig.orders.append(order)
+    try:
+        if condition is None:
+            begin()
+        else:
+            when(rig, condition, begin)
+    except BaseException:
+        rig.orders.remove(order)
+        raise
+
+
+def _clear(rig: BenchRig, fault: str) -> None:
+    """Clear a fault, and cancel it if it waits for a time or a condition."""
+    rig.operator.clear(fault)
+    rig.cancel(fault)

@@ -240,3 +240,45 @@ def test_what_is_awaited_or_run_passes(pytester: pytest.Pytester, run: Run) -> N
         """
     )
     run("-W", "default").assert_outcomes(passed=2, warnings=1)
+
+
+NEVER = """
+def test_one(bench):
+    bench.fault("vr2_fault", when=lambda: bench.get("state") == "Nowhere", for_="1s")
+    bench.run_for("1s")
+"""
+
+
+def test_a_fault_that_never_began_is_a_warning_of_a_test_that_passed(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(NEVER)
+    result = run("-W", "default")
+    result.assert_outcomes(passed=1, warnings=1)
+    text = "a fault of this test never began: vr2_fault: the condition of *.py:? was never true"
+    result.stdout.fnmatch_lines([f"*.py:?: PytestWarning: {text}"])
+    run("-W", "error").assert_outcomes(failed=1)
+
+
+def test_a_fault_that_never_began_is_in_the_report_of_a_failure(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(f"{NEVER}    assert 0\n")
+    result = run("-W", "default")
+    result.assert_outcomes(failed=1, warnings=0)
+    result.stdout.fnmatch_lines(
+        ["*bench: faults that never began*", "vr2_fault: the condition of *.py:? was never true"]
+    )
+
+
+def test_a_fault_that_is_cleared_waits_for_nothing(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        def test_one(bench):
+            bench.fault("vr2_fault", when=lambda: bench.now_us >= 500_000)
+            bench.clear("vr2_fault")
+            bench.run_for("1s")
+            assert bench.get("vr2_fault") == 0
+        """
+    )
+    run("-W", "error").assert_outcomes(passed=1)

@@ -85,6 +85,17 @@ def test_a_fault_comes_with_a_line_and_goes_in_its_time(bench: Bench) -> None:
     bench.fault("flip=0.5@0s-1s")
 
 
+def test_a_fault_that_waits_for_its_condition_can_be_cancelled(bench: Bench) -> None:
+    ready: list[bool] = []
+    bench.fault("bus_noise", when=lambda: bool(ready))
+    assert [order.due_us for order in bench._mode.orders] == [None]
+    bench.clear("bus_noise")
+    ready.append(True)
+    bench.run_for("50ms")
+    assert bench.get("bus_noise") == 0
+    assert list(bench._mode.orders) == []
+
+
 def test_power_is_that_of_the_emulator(bench: Bench) -> None:
     bench.switch_off()
     assert bench.wait_until(lambda: bench.get("state") == "Off", within="5s")
