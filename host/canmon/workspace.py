@@ -523,7 +523,7 @@ def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
     """Return the bus name in the settings of a sending panel.
 
     If the settings have no bus name, the result is an empty text, which stands for the first bus.
-    The name is checked only if a bus is open.
+    If the source is a log, no bus is open, and the name is not checked.
 
     Raises:
         SettingError: no open bus has this name.

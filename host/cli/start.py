@@ -214,7 +214,8 @@ def standard_streams() -> Iterator[None]:
 def raise_of_output(error: Exception) -> None:
     """Raise an error again if it came from writing standard output. Otherwise, return.
 
-    If this function returns, the caller must report the error.
+    If this function returns, the caller must report the error. If the reader has closed the pipe,
+    as `| head` does, the error is raised again, and the command ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]

@@ -112,7 +112,10 @@ StampedFrames = tuple[tuple[int, CanFrame], ...]
 
 
 class StampedLink(Link[Frames], Protocol):
-    """Link to a CAN bus that returns each received frame with its arrival time."""
+    """Link to a CAN bus that returns each received frame with its arrival time.
+
+    The arrival times show whether the bus was silent, or the host read the frames late.
+    """
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for the next frame, then return all received frames with their arrival times.

@@ -140,7 +140,7 @@ class RrcClient(Closing):
 
     @property
     def watchdog_us(self) -> int:
-        """Time-out in us of the watchdog that stops the wheelchair, or 0 if the watchdog is off."""
+        """Time-out in us of the watchdog that the client renews, or 0 if the watchdog is off."""
         return self._settings.watchdog_10ms * 10_000
 
     @property

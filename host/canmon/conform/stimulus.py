@@ -469,7 +469,8 @@ class Consent:
         - With the option `--yes`, the answer is yes.
         - If the node is emulated in virtual time, the answer is also yes, with one exception. One
           of the questions is whether to send LSS requests to all nodes of the bus. If there are
-          other nodes on the bus, the answer to this question is no.
+          other nodes on the bus, the answer to this question is no, because these nodes would also
+          answer.
         - In any other case, if there is no terminal, the answer is no.
         """
         if self._yes:

@@ -633,7 +633,7 @@ class TrafficSnapshot(NamedTuple):
     Attributes:
         at_us: time of the snapshot in microseconds.
         buses: statistics of the buses, sorted by name.
-        rows: statistics of the CAN-IDs of each bus, sorted by bus and CAN-ID.
+        rows: statistics of the CAN-IDs of each bus, sorted by bus and CAN-ID with flags.
     """
 
     at_us: int = 0

@@ -56,9 +56,10 @@ def read(
 ) -> None:
     """Read objects of NODE, by name or index. Without an object, read all that its EDS names.
 
-    Use a name from the EDS, or from CiA 301 or 402. Write a name from the EDS in small letters, and
-    write _ for each character that is not a letter or a digit. Examples are position_actual_value
-    and identity_object.vendor_id. The exit status is 1 if the node refuses an object.
+    Use a name from the EDS, or else from CiA 301 or 402. Write a name from the EDS in small
+    letters, and write one _ for each series of characters that are not letters or digits. Examples
+    are position_actual_value and identity_object.vendor_id. The exit status is 1 if the node
+    refuses an object.
 
     \b
     canmon net can0 read 5 statusword 1018h:1 --eds drive.eds

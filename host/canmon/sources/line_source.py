@@ -49,7 +49,7 @@ _UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PRO
 class RtcLiteLine:
     """Decoder of the traffic between a host and an RTC-Lite device on a serial line.
 
-    An RTC-Lite device is a small processor. Both directions are decoded. The bytes may arrive in
+    An RTC-Lite device has a small processor. Both directions are decoded. The bytes may arrive in
     chunks of any size.
 
     Args:

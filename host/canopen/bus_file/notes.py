@@ -72,7 +72,7 @@ class BusFileNotes:
 
 
 class BusFileSection:
-    """A section of a bus.yml. Its methods read values, and report invalid values.
+    """A section of a bus.yml. Its methods read values and report invalid values, as dcfgen would.
 
     Args:
         notes: collector of the findings.

@@ -113,7 +113,7 @@ class _StrayHeartbeat:
 
         The check is done only if the node sent a heartbeat before the run although object 1017h did
         not enable one. If this heartbeat is missing now, `unrestored` becomes a text that reports
-        it.
+        it. The tester cannot switch on such a heartbeat.
         """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:

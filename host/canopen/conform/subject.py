@@ -350,7 +350,8 @@ class Subject:
         """Return the reason if a missing object prevents a check. Otherwise, return None.
 
         For each mandatory object, there is one check that is executed even if the object is
-        missing. This check then fails. For the object 1000h, it is the check UE-01.
+        missing. This check then fails. For the object 1000h, it is the check UE-01. Other checks
+        that need the object are not executed.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"

@@ -373,8 +373,8 @@ class BootOutcome:
     """Result of the boot-up of a slave.
 
     Attributes:
-        status: `BootStatus.BOOTED` if the boot-up succeeded. Otherwise, the error status (CiA
-            302-2).
+        status: error status of the boot-up (CiA 302-2). `BootStatus.BOOTED` and
+            `BootStatus.WAS_OPERATIONAL` mean success.
         state: last NMT state that the slave has reported, or None if it has reported none.
     """
 

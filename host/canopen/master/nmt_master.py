@@ -58,7 +58,7 @@ class ProcessData:
 
         A drive is read and written once in each period. The period is a fixed time, or the time
         from one SYNC to the next. No period begins before the slaves have booted for the first
-        time.
+        time. This behaviour is as in ros2_canopen, whose drivers wait for the slaves.
 
         Args:
             now_us: current time in microseconds.

@@ -76,7 +76,7 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
 
     Returns:
         A text for each error. An error is a setting that a node will refuse, or a COB-ID with which
-        several nodes send a PDO.
+        several nodes send a PDO, although no node refuses this COB-ID.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():

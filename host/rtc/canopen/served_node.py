@@ -108,7 +108,8 @@ class DuplicateNodeDetector:
         Args:
             at_us: time of the frame on the bus in us.
             state: NMT state in the frame.
-            listening: whether the server waits, after a boot-up, for frames of a second node.
+            listening: whether the server waits, after a boot-up, for frames of a second node. The
+                server has sent nothing to the node since the boot-up.
         """
         before, self._state = self._state, state
         if state is NmtState.INITIALISING:

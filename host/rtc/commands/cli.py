@@ -16,7 +16,8 @@ from tickrig.host.rtc.commands.verbs import SYSTEM_VERBS, VERBS, conf
 def rtc() -> None:
     """Run RT components, and work with them while they run.
 
-    Components are named ConsoleIn0 or localhost/ConsoleIn0.rtc. Ports are named ConsoleIn0.out or
+    The commands are similar to those of rtshell, the command-line tools of OpenRTM. Components are
+    named ConsoleIn0 or localhost/ConsoleIn0.rtc. Ports are named ConsoleIn0.out or
     localhost/ConsoleIn0.rtc:out.
 
     \b

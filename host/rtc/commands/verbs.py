@@ -462,7 +462,7 @@ def save(at: Path, file: Path | None) -> None:
 @as_json
 @at
 def status(at: Path, as_json: bool) -> None:
-    """Show the number of components, the time of the system, and how many ticks began late.
+    """Show the number of components, the time, the number of late ticks and the longest delay.
 
     \b
     tickrig rtc status --json

@@ -233,7 +233,8 @@ class QuestionScreen(_PromptScreen[str]):
 class ChoiceScreen(_PromptScreen[_T]):
     """Dialog in which the user chooses a row of a list.
 
-    The dialog has a field for a search text. The list shows only the rows that contain this text.
+    The dialog has a field for a search text. The list shows only the rows that contain all words of
+    this text.
 
     The result is None if the user chooses no row.
 

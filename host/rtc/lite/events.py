@@ -134,7 +134,10 @@ class PingMonitor:
         return self._ping(now_us)
 
     def let_go(self) -> None:
-        """Stop waiting for the answer to a routine PING, so that a request can be sent."""
+        """Stop waiting for the answer to a routine PING, so that a request can be sent.
+
+        The reply to the request will also show that the device is present.
+        """
         if self.pending:
             self.awaiting = False
             self._count_missed()

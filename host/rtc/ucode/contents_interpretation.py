@@ -50,7 +50,8 @@ class ContentsInterpretation(Lookup[Contents]):
     - `place` out: the ucode, then `name=value` of each property
 
     The information at an address is a JSON object with the numbers `x_m` and `y_m`. Its other
-    members are properties.
+    members are properties. The NEDO report (Fig. 123) gives only the name of the component and its
+    cache, so the ports and the JSON object are additions of Tickrig.
 
     Args:
         instance_name: name of the component.

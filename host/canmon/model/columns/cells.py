@@ -54,6 +54,8 @@ _MARK: Final = "\x01"
 def table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
     """Pack each text into the bytes of one integer, and return the array of integers.
 
+    The array is a lookup table: numpy can take the texts of many rows from it at once by index.
+
     Args:
         texts: ASCII texts. A text may have at most as many characters as an integer of the array
             has bytes.

@@ -327,7 +327,8 @@ class BusDecoder:
 
         Args:
             node: node-ID of the SDO server.
-            step: result of `SdoChannel` for the frame.
+            step: result of `SdoChannel` for the frame, such as its text and the transfers that
+                ended with it.
         """
         if not step.ended:
             return Decoded(

@@ -290,8 +290,8 @@ def parse_signal(text: str) -> CurveSpec:
     """Parse the request for a curve, which has the form `[LABEL=]SIGNAL[@AXIS]`.
 
     `LABEL` is the displayed name of the curve. `SIGNAL` is bits of a frame, such as
-    `181[2:6]s*0.001`, or an object, such as `3.position`. `AXIS` is the number of the vertical
-    axis, 1 by default.
+    `181[2:6]s*0.001`, an object, such as `3.position`, or one of `BUS_SIGNALS`, such as `load` or
+    `3.nmt`. `AXIS` is the number of the vertical axis, 1 by default.
 
     Args:
         text: text of the request.

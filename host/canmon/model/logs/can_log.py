@@ -169,7 +169,7 @@ class CanLogReader:
 def channel_name(channel: object) -> str:
     """Return the bus name for a channel, shortened to a length that logs can hold.
 
-    If the channel is only a number, such as 0, the bus name is `can0`.
+    If the channel is only a number, the bus name is `can` and this number, such as `can0`.
     """
     name = "_".join(str(channel).split())
     if channel is None or not name:

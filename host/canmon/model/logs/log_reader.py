@@ -113,9 +113,9 @@ class ScreenClock:
     def of(cls, text: str) -> ScreenClock:
         """Make a clock for the time stamps in a text of candump lines.
 
-        Such stamps count from the first frame or from the previous frame. If the stamps in the text
-        often decrease, or decrease by much, the clock assumes that they count from the previous
-        frame. Otherwise, it assumes that they count from the first frame.
+        Relative stamps of candump count from the first frame or from the previous frame. If such
+        stamps in the text often decrease, or decrease by much, the clock assumes that they count
+        from the previous frame. Otherwise, it assumes that they count from the first frame.
         """
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]

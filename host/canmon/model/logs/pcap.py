@@ -558,7 +558,7 @@ class PcapngWriter:
         """Complete the capture.
 
         A mark is an event among the frames, such as lost frames. Marks after the last frame are
-        stored as comments in a statistics block.
+        stored as comments in the statistics block of the first bus.
         """
         if self._file.closed:
             return

@@ -56,7 +56,7 @@ def sub_numbers(document: Document) -> Iterator[RuleFinding]:
     """Find objects whose SubNumber differs from the number of their sub-index sections.
 
     Each finding contains an edit that corrects SubNumber. If a sub-index seems to be missing, the
-    finding contains no edit.
+    finding contains no edit, so that the error stays visible.
     """
     file = document.file
     for section, index, sub in file.objects():

@@ -108,7 +108,7 @@ class Project:
         profile: component with its ports.
         node_id: node-ID in the System Definition.
         strict_cia301: whether the NMT commands Start and Enter Pre-operational end the component's
-            Error state, as in CiA 301. By default, only a reset ends this state.
+            Error state, as in CiA 301 (DECISION K9). By default, only a reset ends this state.
     """
 
     profile: RtcProfile
