@@ -380,7 +380,8 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     def finalize(self) -> None:
         """End the component for good, and run the callbacks for its end.
 
-        Afterwards the node sends nothing until its supply has been cut and restored.
+        This is transition M11 of the life cycle. Afterwards the node sends nothing until its
+        supply has been cut and restored.
         """
         if self.state in _ENDING:
             self._call_all(_ENDING[self.state])

@@ -269,8 +269,8 @@ class Rrc(Copyable):
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Run one period of the RRC.
 
-        The order in a period is (DECISION R28): received bytes, buttons and faults, lines,
-        watchdog, motors, SA line, buzzer.
+        The order in a period is (DECISION R28): received bytes, buttons, faults and time, lines,
+        watchdog, motors and vehicle, SA line and load account, buzzer.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

@@ -19,7 +19,8 @@ _LIVE: Final[Decorator] = add_options(
     click.option(
         "--control",
         type=PATH,
-        help="Control socket to serve, for 'tickrig rtc'; the run is in real time until Ctrl-C.",
+        help="Control socket to serve, for 'tickrig rtc --at PATH'; the run is in real time until"
+        " Ctrl-C.",
     ),
     openrtm_options,
 )

@@ -21,7 +21,8 @@ PARAMETERS: Final = (
         name="delay_ms", kind=int, unit="MS", help="Delay until a command takes effect. [0]"
     ),
     _number(
-        "noise", "Random spread of the distance that a wheel drives, such as 0.02 for 2 %. [0]"
+        "noise",
+        "Random spread of a wheel's distance over the ground, such as 0.02 for 2 %. [0]",
     ),
 )
 """Options for `BaseParameters`, which the verbs of `rh3` use, too."""

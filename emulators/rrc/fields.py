@@ -11,7 +11,8 @@ FIELDS: Final = (
         name="power_on_event",
         choices=("PowerOnTrigger", "PowerOn"),
         default="PowerOnTrigger",
-        help="Name of the power-on event; PowerOn is that of the manual's table.",
+        help="Name of the power-on event: PowerOnTrigger as in the field, or PowerOn as in the"
+        " manual's table.",
     ),
     DeviceField(
         name="vehicle",

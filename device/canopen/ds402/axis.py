@@ -397,7 +397,8 @@ class Switches(Part):
 
     A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. The
     negative limit switch belongs to the direction in which the position in user units decreases,
-    and the positive one to the direction in which it increases.
+    and the positive one to the direction in which it increases. The polarity 607Eh is already part
+    of these directions.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.

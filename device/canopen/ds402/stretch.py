@@ -42,7 +42,9 @@ class Stretch(Part):
     def plan(self, now_us: int, *, requested: bool) -> int:
         """Compute the ticks after the present tick in advance.
 
-        The computation ends before the first tick in which anything happens besides the motion.
+        The computation ends before the first tick in which anything happens besides the motion. The
+        interval between the last two requested ticks also limits the number of computed ticks,
+        because the next request is expected after the same interval.
 
         Args:
             now_us: time of the present tick.

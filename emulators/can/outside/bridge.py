@@ -51,7 +51,8 @@ class CanBridge:
         """Send on the emulated bus the frames that the real bus has received since the last poll.
 
         The exact time at which such a frame arrived is unknown. It lies between the last poll and
-        now. Each frame is treated as if it had arrived right after the last poll.
+        now. Each frame is treated as if it had arrived right after the last poll. With a later
+        time, a host outside would get each answer up to a tick later.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)

@@ -471,21 +471,21 @@ class HostWaits(Copyable):
     def deadline_us(self, timeout_s: float | None) -> int:
         """Return the time in microseconds at which a wait that starts now must end.
 
-        A port without a timeout waits for at most one hour, then `give_up` raises SerialException.
+        A wait without a timeout lasts at most one hour, then `give_up` raises SerialException.
 
         Args:
-            timeout_s: timeout of the port in seconds, or None if the port has no timeout.
+            timeout_s: timeout in seconds, or None if there is no timeout.
         """
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
     def give_up(self, timeout_s: float | None) -> None:
-        """Raise SerialException after one hour without data at a port that has no timeout.
+        """Raise SerialException after a wait of one hour without a timeout.
 
-        The caller has waited until `deadline_us`. At a port with a timeout this method does
-        nothing.
+        The caller has waited until `deadline_us`. Without this exception, the host would wait
+        forever. After a wait with a timeout this method does nothing.
 
         Args:
-            timeout_s: timeout of the port in seconds, or None if the port has no timeout.
+            timeout_s: expired timeout in seconds, or None if there was no timeout.
         """
         if timeout_s is None:
             raise SerialException("nothing came for an hour, and no timeout was given")

@@ -37,7 +37,7 @@ class Health:
 
     Errors and lost data on a wire are not reported if a fault of this wire, or of any device,
     occurred before. Lost data on a serial line are not reported either if no host has sent data on
-    this line.
+    this line, because then no host reads the line.
 
     Args:
         bench: bench of the test. For real devices only error frames are known.
@@ -216,8 +216,8 @@ def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
     """Record threads that start in the `with` block of a test and end with an exception.
 
     The record has the name of the thread, the line and the exception. Threads that started before
-    the test are not recorded. A thread that ends by `sys.exit()` is recorded only if its exit
-    status is an error.
+    the test are not recorded, but pytest warns about them as about all threads. A thread that ends
+    by `sys.exit()` is recorded only if its exit status is an error.
 
     Args:
         note: function that is called with a line of text, in the thread that ends.

@@ -95,8 +95,8 @@ def _objects_of(node: Node) -> node_memory.EdsObjects:
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
     """Yield each line of a bench's journal with its text; the text of a CAN frame is decoded.
 
-    PDOs are decoded with the mapping of the emulated node after power-on, or with the mapping that
-    the host wrote, even if the journal no longer has these lines.
+    PDOs are decoded with the default mapping of the emulated node, or with the mapping that the
+    host wrote, even if the journal no longer has the lines with this mapping.
     """
     meanings, buses = decoder.Decoder(_objects(bench)), buses_of(bench)
     for line in bench._mode.mappings():
@@ -111,7 +111,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 def last_lines(bench: Bench, count: int) -> str:
     """Return the last events on a bench as lines of text with time, wire, direction and content.
 
-    An incomplete line of text on a serial line comes after all other events.
+    Lines that are incomplete at the end come after all other events.
     """
     described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]

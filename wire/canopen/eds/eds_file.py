@@ -195,8 +195,9 @@ class EdsFile:
         """Return the value of a keyword that is a number or a word, without a trailing comment.
 
         A trailing comment begins with `;`, `#` or `//`. These characters have no other meaning
-        after a number or an access type. In CiA 306 a comment is a line of its own. Therefore each
-        trailing comment adds a warning to the findings.
+        after a number or an access type. In CiA 306 a comment is a line of its own, but many
+        programs also accept a comment that begins with ` ;` after a value. Each trailing comment
+        adds a warning to the findings.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)

@@ -497,8 +497,8 @@ class Operators:
     Args:
         plan: content of the rig file.
         where: section of the rig file for real devices.
-        like: emulated devices with the same names and types. They do not run: only the names of
-            their inputs, outputs and faults are used.
+        like: emulated devices with the same names and types, for the names of inputs, outputs and
+            faults. These devices do not run.
         terminal: terminal of the human.
         journal: journal that records the actions.
 
@@ -593,7 +593,7 @@ class Operators:
 
         Raises:
             NotOnThisBench: the fault begins when a condition is true, but a human operates the
-                device.
+                device, and is too slow for this.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
