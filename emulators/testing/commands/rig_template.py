@@ -103,7 +103,7 @@ def _free(node_id: int, taken: set[int]) -> int:
 
 
 def _beside(line: str, comment: str) -> str:
-    return f"{line:<30}  # {comment}"
+    return f"{line:<30}  # {comment}" if comment else line
 
 
 def _device_lines(plan: DevicePlan, found: Probe) -> Iterator[str]:

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.commands.device_type import DEVICES
+from tickrig.emulators.testing.commands import rig_template
 from tickrig.emulators.testing.commands.init_cli import init
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
@@ -63,6 +64,10 @@ def test_two_blanks_stand_before_each_comment(folder: Path) -> None:
     lines = (folder / "rig.toml").read_text("utf-8").splitlines()
     close = [line for line in lines if re.match(r"(# )?(\S+ = |\[)[^#]*(?<!  )#", line)]
     assert close == []
+
+
+def test_a_device_with_one_output_has_no_empty_comment() -> None:
+    assert rig_template._beside("# lamp.level = 0", "") == "# lamp.level = 0"
 
 
 def test_a_file_that_is_there_is_left_alone(folder: Path) -> None:
