@@ -42,7 +42,7 @@ class DeviceComponent(Copyable):
 
     A subclass declares ports as attributes of the class, and each component gets its own copies of
     them. Callbacks are optional. Declare a callback that cannot fail as `-> None`. A callback that
-    can fail returns `ERROR`. Power-on makes a new component, so attributes of `self` behave like
+    has failed returns `ERROR`. Power-on makes a new component, so attributes of `self` behave like
     the device's RAM.
 
     Attributes:
@@ -185,7 +185,7 @@ def shown(value: Any) -> float | str:
 
     The emulated device lists its ports among its physical outputs, which a user can read.
 
-    A boolean becomes a number, and a sequence becomes a text with blanks.
+    A boolean becomes a number. A sequence becomes a text of its elements, separated by blanks.
     """
     if isinstance(value, tuple):
         return " ".join(str(shown(element)) for element in value)

@@ -16,8 +16,9 @@ class Horizon(Part):
     Attributes:
         passed_us: time up to which all ticks are done.
         until_us: time up to which a device may compute its ticks ahead. Before this time, the rig
-            exchanges frames with the device, but does not read its state. Only a scheduled action
-            of the rig (an action of the event queue) may read the state between two ticks.
+            exchanges frames with the device, but does not read its state. There is one exception: a
+            scheduled action of the rig (an action of the event queue) may read the state between
+            two ticks.
     """
 
     passed_us: int = 0

@@ -54,8 +54,8 @@ class Registers(Part):
 
     Args:
         table: descriptions of the numbers.
-        measured: functions by name of a number. Such a function computes its number each time a
-            master reads it.
+        measured: functions that compute numbers. The key of a function is the name of its number.
+            The function is called each time a master reads the number.
     """
 
     def __init__(

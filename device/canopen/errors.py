@@ -78,8 +78,8 @@ class ErrorBehaviour(Service):
 
     Each sub-index of 1029h is for one kind of error. If the sub-index for communication errors is
     missing, the value 0 is used. If the sub-index for another kind is missing, errors of this kind
-    have no effect. The service acts after the EMCY producer, so that the EMCY is sent before the
-    slave is Stopped. Writing an undefined value to 1029h is refused with 0609 0030h.
+    have no effect. After an error, the EMCY is sent first, and then the NMT state changes. Writing
+    an undefined value to 1029h is refused with 0609 0030h.
 
     Sub-indices that other profiles or manufacturers define are not emulated. Instead, an
     application may call `node.enter` itself.

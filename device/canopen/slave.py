@@ -182,10 +182,10 @@ class Service(Copyable):
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Yield the CAN-IDs of frames that may change which CAN-IDs the slave receives.
+        """Yield the CAN-IDs of frames that may change the acceptance filter of the slave.
 
-        The emulated bus has an acceptance filter for each slave. After a frame with one of these
-        CAN-IDs, the filter of this slave is open for all frames, until the slave has handled the
+        The emulated bus has an acceptance filter for each slave. After a frame with a yielded
+        CAN-ID, the filter of this slave is open for all frames until the slave has handled the
         frame.
 
         Args:
@@ -722,7 +722,7 @@ class Application(Service):
         """Simulate the device while it has no supply, for example the motor as it coasts.
 
         The method is called in the first tick without power, and after a physical input was set. It
-        is also called at the time that it has returned.
+        is also called at the time that the latest call has returned.
 
         Args:
             now_us: time of the tick.

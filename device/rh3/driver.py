@@ -223,9 +223,9 @@ class Driver(Part):
 
         Args:
             last_request_us: time of the latest request of the master.
-            until_us: time of the last millisecond that the call may run. If the call runs several
-                milliseconds, it sets the attribute `now_us` of this object to the time of the last
-                one.
+            until_us: time of the last millisecond that the call may run. After the call, the
+                attribute `now_us` of this object is the time of the last millisecond that the call
+                has run.
 
         Returns:
             The speeds of the left and the right wheel in each millisecond, in counts/ms.

@@ -342,8 +342,8 @@ class Side(Part):
         Args:
             steps: number of milliseconds. It must be 1 if the target is a position, or while the
                 wheel is `stalling`.
-            stop: whether the target is standstill.
-            to_position: whether the target is a position. Otherwise the target is a speed.
+            stop: whether the target is standstill. If true, `to_position` has no effect.
+            to_position: true if the target is a position, false if the target is a speed.
 
         Returns:
             The speed of the wheel in each millisecond, in counts/ms.

@@ -97,19 +97,20 @@ class Gearbox:
     def drive(
         self, tick: int, mode: int, stick: tuple[int, int], shaped: tuple[int, int], knobs: Joystick
     ) -> tuple[int, int]:
-        """Return translation and rotation for one tick, limited by the reverse mode and the gear.
+        """Return translation and rotation for one tick.
+
+        They are the values of `shaped`. The reverse mode and the gear can reduce them, or change
+        the sign of the rotation (DECISION R18).
 
         Args:
             tick: number of the tick.
             mode: reverse mode 0 to 3, which determines the movement when the stick is pulled back
                 (see `Gearbox`). Parameter #7 of the command `joystick` or the buttons set this
                 mode.
-            stick: translation and rotation of the stick, before `shape`. The angle of the stick
-                determines the gear.
-            shaped: translation and rotation of the stick, after `shape`. The result is computed
-                from them (DECISION R18).
-            knobs: parameters of the command `joystick`. This method uses #8 to #10: the neutral
-                radius, and the angles `switch_deg` and `fade_deg`.
+            stick: translation and rotation of the stick itself. They determine the gear.
+            shaped: translation and rotation of the stick after the function `shape`.
+            knobs: parameters of the command `joystick`. This method uses three of them: the neutral
+                radius `neutral_pct`, and the angles `switch_deg` and `fade_deg`.
         """
         v_pct, w_pct = shaped
         if mode == 0:
@@ -208,13 +209,15 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 
 
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
-    """Return translation and rotation within the limits of a `limit` command, with their signs.
+    """Return translation and rotation, reduced to the limits of a `limit` command.
 
-    First translation and rotation are each limited to their own limit. Then both are multiplied by
-    the same factor, so that the direction of travel stays the same. The command has three limits
-    for both values together: for their sum, for their product, and for the root of the sum of their
-    squares. The factor is the largest one, at most 1, with which these three limits are kept (RRC
-    manual, `limit`). All arithmetic is integer and rounds down (DECISION R19).
+    The limits apply to the absolute values, and the signs stay. The command has five limits (RRC
+    manual, `limit`). The first is for translation, and the second is for rotation. The other three
+    are for both values together: for their sum, for their product, and for the root of the sum of
+    their squares. First, each value is reduced to its own limit. Then both values are multiplied by
+    the same factor, so that the direction of travel stays the same. The factor is the largest one,
+    at most 1, with which the other three limits are kept. All arithmetic is integer and rounds down
+    (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)
@@ -239,7 +242,7 @@ class Drive:
 
     Attributes:
         out_pct: translation and rotation of the latest tick, -100..100 %.
-        gearbox: forward gear or backward gear of reverse modes 2 and 3; see `Gearbox`.
+        gearbox: the gear that the RRC imitates; see `Gearbox`.
         by_stick: whether the stick drives the motors.
     """
 

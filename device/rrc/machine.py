@@ -91,10 +91,9 @@ class ReceiveBuffer:
     Attributes:
         size: capacity in bytes, including line ends.
         overflows: number of overflows.
-        thrown_blocks: number of blocks of `size` bytes that were discarded after overflows. For
-            each overflow, the bytes are counted that are discarded after it up to the end of the
-            line. Each full `size` bytes are one block. A block costs as much processing time as an
-            overflow.
+        thrown_blocks: number of full blocks of `size` bytes that were discarded after overflows.
+            After each overflow, the count of the bytes of a block starts from 0. A block costs as
+            much processing time as an overflow.
     """
 
     size: int
@@ -269,8 +268,7 @@ class Rrc(Copyable):
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Run one period of the RRC.
 
-        The order in a period is (DECISION R28): received bytes, buttons, faults and time, lines,
-        watchdog, motors and vehicle, SA line and load account, buzzer.
+        The top of this file lists the steps of a period in their order (DECISION R28).
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

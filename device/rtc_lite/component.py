@@ -128,8 +128,9 @@ class LiteComponent(DeviceComponent):
         out_ports: out-ports by name, in order of declaration.
 
     Raises:
-        ValueError: the type name is invalid, an input accepts fractions, there are more than 8
-            in-ports or more than 8 out-ports, or two of them have the same name.
+        ValueError: the type name is invalid, there are more than 8 in-ports or more than 8
+            out-ports, or two ports have the same name. The error is also raised if a physical input
+            accepts fractions, because these components support only integers as inputs.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):

@@ -51,8 +51,8 @@ def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
 
     Args:
         machine: the machine to copy.
-        begun: attributes that the copy does not take over from the machine, by name, with their
-            values in the copy.
+        begun: values by name of attribute. In the copy, these attributes have these values instead
+            of the values that they have in the machine.
 
     Returns:
         The attributes of the machine by name. If some attributes are not in its `__dict__`, the

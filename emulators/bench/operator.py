@@ -396,8 +396,8 @@ class Assembly(Copyable):
             name: name of the signal, with or without the prefix of its device.
 
         Returns:
-            The device, or None if no device has the signal. The second value is the name without
-            the prefix.
+            Two values. The first is the device, or None if no device has the signal. The second is
+            the name without the prefix.
         """
         prefix, slash, rest = name.partition("/")
         if slash and (part := self.parts.get(prefix)):

@@ -28,10 +28,11 @@ _SWITCH_S: Final = 0.0005
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Context manager for programs in real time, in which Python switches threads more often.
+    """Context manager that makes a program in real time more punctual.
 
-    Garbage collection skips all objects that exist already (they are "frozen"), because a
-    collection of all objects takes 50 ms.
+    Inside the context, Python switches threads more often. A garbage collection of all objects
+    takes 50 ms. Therefore garbage collection skips all objects that exist at the start of the
+    context (they are "frozen").
     """
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)

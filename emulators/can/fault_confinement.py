@@ -209,11 +209,14 @@ class Recovery(Part):
         )
 
     def interrupt(self, at: int, until: int) -> None:
-        """Count the sequences of recessive bits up to the start of a frame on the bus.
+        """Interrupt the counting, because a frame starts on the bus.
+
+        For each waiting node, the sequences of 11 recessive bits before the frame are counted.
 
         Args:
             at: time of the first dominant bit of the frame.
-            until: time at which the bus is recessive again. The count continues at this time.
+            until: time at which the bus is recessive again. From this time on, further sequences
+                are counted.
         """
         for number, (end, left, since) in self._waiting.items():
             seen = max(0, at - since) // self._sequence

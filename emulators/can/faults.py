@@ -127,9 +127,9 @@ class CanFaults(Copyable):
         Args:
             name: name of the fault.
             *arguments: texts after `NAME=`, split at commas.
-            number: number of a bus end. The fault then hits only frames from this end, which is
-                possible for the faults in `NARROWED`. With None the fault hits all frames of the
-                bus.
+            number: number of a node on the bus (`CanEnd.number`). The fault then hits only frames
+                from this node. Only the faults in `NARROWED` can be limited to a node. With None
+                the fault hits all frames of the bus.
 
         Raises:
             KeyError: no fault has this name.

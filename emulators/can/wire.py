@@ -123,10 +123,10 @@ class CanWire(Copyable):
         return due_us <= until_us
 
     def load_permille(self, window_us: int = WINDOW_US) -> int:
-        """Return the load of the bus: the share of the latest time in which it was busy.
+        """Return the load of the bus: the share of a time window in which the bus was busy.
 
         Args:
-            window_us: length of the time before now that is measured, at most a second.
+            window_us: length of the window in microseconds, at most a second. It ends now.
 
         Returns:
             The load in 0.1 %.

@@ -22,7 +22,8 @@ class NodeSpec:
     Attributes:
         device: EDS or DCF of the node, name of a model, or `FILE.py:Class` of a DeviceRTC.
         node_id: node-ID 1..127, or `UNCONFIGURED`, or None to use the node-ID of the DCF or model.
-        profile: name of `choices.PROFILES`, or None to use the profile of all nodes.
+        profile: name of the node's profile, one of `choices.PROFILES`. None means the profile that
+            the option `--profile` gives for all nodes.
     """
 
     device: Path | str

@@ -137,7 +137,7 @@ def _complete_serve(context: click.Context, option: click.Parameter, begun: str)
 
 
 def run_named(name: str, options: Mapping[str, Any]) -> int:
-    """Run an emulated device of a given type for its command, and return the exit status.
+    """Run an emulated device of a given type, and return the exit status for the command line.
 
     Args:
         name: name of a device type in `device_type.DEVICES`.

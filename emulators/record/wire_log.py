@@ -120,12 +120,14 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return the latest line or frame of each direction if it has not ended; its number is 0.
+        """Return the lines or frames that have not ended yet, at most one of each direction.
+
+        The attribute `number` of the returned entries is 0.
 
         Args:
-            by_gap: kind of the entries. True selects the frames that only a silence can end. All
-                bytes of such a frame may be there, but the silence has not ended it yet. False
-                selects the lines, and the frames whose end is known from their bytes.
+            by_gap: whether to return only frames that end by a silence on the line. All bytes of
+                such a frame may have arrived, but the silence is still too short. With False, the
+                result contains only lines, and frames whose end is known from their bytes.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

@@ -11,7 +11,7 @@ from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):
-    """Interface of an object with the physical inputs of a device by name, such as an `InputBank`.
+    """Interface of a collection of the physical inputs of a device, such as an `InputBank`.
 
     Attributes:
         changed: whether an input was set since the device last checked its inputs.

@@ -131,8 +131,9 @@ class FaultForm(Immutable):
 
     Attributes:
         text: description of the fault as readable text.
-        rated: whether the fault also accepts the arguments `rate=` (a probability) and `count=` (a
-            largest number of times).
+        rated: whether the fault also accepts the arguments `rate=` and `count=`. The rate is the
+            probability that the fault acts each time it could. The count is the largest number of
+            times that it acts.
         arguments: arguments of the fault itself. If the attribute `bare` of an argument is true,
             the value of this argument may be written without a name. Values without names stand in
             the order of the arguments.
@@ -196,7 +197,8 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
     Args:
         name: name of the fault, for error messages.
         form: description of the fault with its arguments.
-        words: the arguments as texts, which are the text after `NAME=` split at commas.
+        words: the arguments, each as a text such as `rate=0.1`. The user writes them after the name
+            of the fault and `=`, separated by commas.
 
     Raises:
         ValueError: an argument is unknown, or a value is out of range.
@@ -360,10 +362,13 @@ def _by_bare_name(name: str, names: Iterable[str]) -> dict[str, str]:
 def near_fault(name: str, names: Iterable[str], inputs: Iterable[str] = ()) -> str:
     """Return a hint for an unknown fault name, such as a similar name, or the names of all faults.
 
+    Some failures, such as overheating, are caused by physical inputs instead of faults. For the
+    name of such a failure, the hint suggests these inputs.
+
     Args:
         name: the unknown name.
         names: names of the known faults.
-        inputs: names of inputs that the hint may suggest.
+        inputs: names of the physical inputs.
 
     >>> near_fault("overheat", ["cut"], ["load_nm", "ambient_c"])
     "set the input 'load_nm' or 'ambient_c'"

@@ -100,7 +100,8 @@ class ByteEnd(Port[bytes], Protocol):
     def sent_us(self) -> int:
         """Time at which the last byte from this end will have been sent.
 
-        If all bytes have been sent, the result is a time in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past or `NEVER`, with the same
+        meaning.
         """
         ...
 

@@ -433,9 +433,9 @@ class Rig(Copyable):
         Args:
             t_us: end of the run, in microseconds since the start of the rig.
             host: host whose traffic ends the run early, or None to run to the end.
-            unseen_us: duration in microseconds after `t_us` in which the caller does not expect to
-                read devices or to set inputs between ticks. The run is then faster. The result is
-                also right if the caller does so.
+            unseen_us: duration after `t_us` in microseconds. The caller expects that it will not
+                read devices or set inputs between ticks in this time. The run is then faster. If
+                the caller reads or sets something all the same, the result is still right.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):
@@ -606,14 +606,13 @@ class Rig(Copyable):
             watch(now_us)
 
     def late_since(self, t_us: int) -> int:
-        """Return the largest delay of a step in real time since a given time.
+        """Return the largest delay of the steps since `t_us`.
 
-        Delays up to `_LATE_US` do not count.
+        In a run in real time, a step can be delayed. Delays up to `_LATE_US` are ignored.
 
         Args:
-            t_us: time from which late steps count, in microseconds. Only the last `LATE_KEPT` late
-                steps are stored. If there were more since `t_us`, the result is the largest delay
-                of the whole run.
+            t_us: time of the rig in microseconds. Only the last `LATE_KEPT` late steps are stored.
+                If there were more since `t_us`, the result is the largest delay of the whole run.
         """
         if len(self._late) == LATE_KEPT and self._late[0][0] > t_us:
             return self.worst_late_us

@@ -14,7 +14,9 @@ _LOOKING: Final = "receive with a timeout"
 
 
 class SimLink:
-    """A host's `Link[bytes]` to an emulated serial line that advances virtual time as it waits.
+    """A host's `Link[bytes]` to an emulated serial line, in virtual time.
+
+    While a method of the link waits, it advances the time of the rig.
 
     Args:
         rig: the rig to advance.

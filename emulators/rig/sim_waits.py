@@ -69,9 +69,9 @@ class Looks(Copyable):
         self._count, self._at_us = 0, NEVER
 
     def refusal(self, now_us: int, instead: str) -> str:
-        """Count a poll without result, and return an error message if there were too many.
+        """Count a poll that has found no data, and return an error message after too many.
 
-        If the number of polls is still allowed, the result is an empty text.
+        While there were at most `MOST_LOOKS` such polls at `now_us`, the result is an empty text.
 
         Args:
             now_us: present time in microseconds.
@@ -107,7 +107,7 @@ class HostLimit(Copyable):
         """Count a read of the clock."""
 
     def count(self, now_us: int, where: Callable[[], str] | None = None) -> None:
-        """Count a wait of a host.
+        """Count a wait of a host. A subclass can limit the waits.
 
         Args:
             now_us: present time in microseconds.

@@ -52,10 +52,10 @@ class PanelView:
 
     Attributes:
         values: values of inputs and outputs by name.
-        status: status of the run by name.
-        lines: latest lines on the wire, each as `(time, mark, text)`. Lines with the status `SA`
-            are omitted.
-        report: latest line with the status `SA`.
+        status: values by name that describe the run of the emulator, such as its time.
+        lines: latest lines on the wire, each as `(time, mark, text)`. `SA` lines, the periodic
+            reports of the RRC, are omitted.
+        report: latest `SA` line, or empty if no `SA` lines arrive now.
     """
 
     values: Mapping[str, _Value] = field(default_factory=dict)

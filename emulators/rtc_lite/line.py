@@ -294,7 +294,7 @@ class Radio(HoldingFault[bytes]):
 
 
 def radio(settings: RadioSettings) -> FaultType[bytes]:
-    """Return a radio link as a fault type that can be armed at a serial line.
+    """Return a fault type that makes a serial line behave like a radio link.
 
     The `rate` of the fault is the probability that a packet is lost.
     """

@@ -51,7 +51,8 @@ class HostSetting:
 
         Args:
             now_us: present time in microseconds.
-            at_once: whether to check even if the last check is recent, because the host has acted.
+            at_once: true if the host has just acted. The check is then done even if the last check
+                was less than half a second ago.
         """
         if now_us < self._next_us and not at_once:
             return
@@ -98,7 +99,7 @@ class Bridge:
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Send on the emulated line the data that outside hosts have written since the last poll.
+        """Read the data that outside hosts have written, and send them on the emulated line.
 
         The exact time at which a host has written data is not known: it is after the last poll and
         before this poll. The data are sent as if the host had written them right after the last
@@ -159,10 +160,10 @@ class HostEnd:
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return the time at which to check whether `count` bytes have arrived at this end.
+        """Return the time at which to check whether `count` bytes have arrived at the host.
 
-        The result may be `NEVER`. If bytes are missing at this time, the caller calls this method
-        again.
+        If bytes are missing at this time, the caller calls this method again. If no bytes are in
+        transit to the host, the result may be `NEVER`.
         """
         return self._end.arrival_us(count)
 
@@ -192,7 +193,8 @@ class HostEnd:
     def sent_us(self) -> int:
         """Time at which the last byte of the host will have been sent.
 
-        If all bytes have been sent, the result is a time in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past or `NEVER`, with the same
+        meaning.
         """
         return self._end.sent_us
 

@@ -153,7 +153,8 @@ class LineEnd(Part):
     def sent_us(self) -> int:
         """Time at which the last byte of this end will have been sent.
 
-        If all bytes have been sent, the result is a time in the past, or `NEVER`.
+        If all bytes have been sent, the result is a time in the past or `NEVER`, with the same
+        meaning.
         """
         return self._out.last_us
 

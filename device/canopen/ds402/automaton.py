@@ -85,8 +85,9 @@ def command_of(controlword: int) -> Command | None:
 class Automaton(Part):
     """The state machine of a drive (CiA 402), which follows the controlword and faults.
 
-    The transitions 5 and 8 lead from the state "Operation enabled" to "Switched on" and to "Ready
-    to switch on". If the option codes require it, the motor is braked before these transitions.
+    The drive leaves the state "Operation enabled" by transition 5 to "Switched on", or by
+    transition 8 to "Ready to switch on". If the option codes require it, the motor is braked before
+    these transitions.
 
     Args:
         stopping: object that brakes according to the option codes.
@@ -268,8 +269,8 @@ class Supervision(Part):
         """Check the drive for faults in one tick.
 
         Returns:
-            The faults of `present`. While the motor is powered, a following error and a stalled
-            motor are added.
+            The error codes of the present faults. A following error and a stalled motor are
+            detected only while the motor is powered.
         """
         found, self.waiting = self.present(powered=powered), False
         self.has_supply = ErrorCode.UNDER_VOLTAGE not in found

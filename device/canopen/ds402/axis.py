@@ -396,9 +396,9 @@ class Switches(Part):
     """The limit switches and the home switch of an axis, as the drive reads them.
 
     A switch is pressed by a physical input ("by hand"), or by the shaft at certain angles. The
-    negative limit switch belongs to the direction in which the position in user units decreases,
-    and the positive one to the direction in which it increases. The polarity 607Eh is already part
-    of these directions.
+    negative limit switch limits the direction in which the position in user units decreases. The
+    positive limit switch limits the opposite direction. The position in user units is the position
+    with the sign that the polarity 607Eh gives it.
 
     Attributes:
         word: value of bits 0 to 2 of 60FDh.

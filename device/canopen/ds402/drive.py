@@ -238,7 +238,7 @@ class Ds402(Application):
 
     @property
     def goes_on_plainly(self) -> bool:
-        """Whether the next ticks only continue the motion of the mode of operation.
+        """Whether the drive only continues its present motion in the next ticks.
 
         Several ticks can then be computed at once. The value is false if an input or a setting has
         changed, if a time-out runs, or if a limit switch could act. It is also false if a function

@@ -43,8 +43,8 @@ class Stretch(Part):
         """Compute the ticks after the present tick in advance.
 
         The computation ends before the first tick in which anything happens besides the motion. The
-        interval between the last two requested ticks also limits the number of computed ticks,
-        because the next request is expected after the same interval.
+        drive expects that requests come at equal intervals. Therefore the interval between the last
+        two requests also limits the number of computed ticks.
 
         Args:
             now_us: time of the present tick.

@@ -75,8 +75,8 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
     """Return a function that writes the bytes of an RPDO to the mapped objects.
 
-    The RPDO must have enough bytes, and bytes after the last object are ignored. An object that is
-    mapped with fewer bits than it has gets zeros in its upper bits, as in CANopenNode.
+    The RPDO must have enough bytes, and bytes after the last object are ignored. If only the low
+    bits of an object are mapped, its other bits are set to 0, as in CANopenNode.
     """
     if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
         return _Bits(slots).unpack

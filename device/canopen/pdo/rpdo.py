@@ -65,9 +65,10 @@ class Rpdo(Part):
 
     @property
     def reconfigures(self) -> bool:
-        """Whether the RPDO can change communication objects, and so the slave's CAN-IDs.
+        """Whether a received frame of the RPDO can change the CAN-IDs of the slave.
 
-        This applies to an MPDO, and to an RPDO with a mapped communication object.
+        The CAN-IDs stand in communication objects. An RPDO can change them if it is an MPDO, or if
+        a communication object is mapped to it.
         """
         entries = (slot.entry for slot in self.mapping.slots())
         return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(

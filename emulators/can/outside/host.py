@@ -107,11 +107,9 @@ class CanHost:
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
         """Send frames periodically: one frame now and one in each period, in turn.
 
-        The frames are sent whenever any code advances the rig's time.
-
         Args:
-            frames: frames to send.
-            period_us: time between two frames.
+            frames: frames to send. After the last one, the first one is sent again.
+            period_us: time between two frames on the clock of the rig.
 
         Returns:
             An object that can change or stop the transmission.
@@ -142,9 +140,8 @@ class CanHost:
 
         Args:
             timeout_us: longest wait; None for no limit.
-            more: whether this call continues an earlier wait with a timeout. The rig limits the
-                number of waits of hosts (`host_limit`), and does not count such a call as another
-                wait.
+            more: whether this call continues the wait of an earlier call. The rig limits the number
+                of waits (`host_limit`). A call that continues a wait is not counted again.
 
         Returns:
             Time and frame, or None after the timeout.

@@ -48,9 +48,10 @@ def retime(target: object, names: _Names, library: str) -> None:
 
 
 def retimed(cls: type, names: _Names, library: str) -> type:
-    """Return a subclass of `cls` whose methods use other global names, such as another clock.
+    """Return a subclass of `cls` for `retime`, in whose methods global names are replaced.
 
-    If no method of `cls` uses one of the names, return `cls` itself. See `retime`.
+    For example, the methods then call another clock function. If no method of `cls` uses one of the
+    names, return `cls` itself. The arguments are those of `retime`.
     """
     members = {
         name: copied

@@ -290,13 +290,12 @@ def complete(
 ) -> Dictionary:
     """Return the dictionary of a drive, completed so that the drive can be emulated.
 
-    Missing values are filled in and missing objects are added.
-
     Args:
         dictionary: the dictionary of the drive's EDS.
         modes: modes of operation of the drive.
-        added: objects that the EDS lacks.
-        defaults: values for objects of the profile without a value in the EDS.
+        added: indices of objects that are not in the EDS. The result contains these objects.
+        defaults: values of objects of the profile. An object gets its value from here if it has no
+            value in the EDS, or if it is not in the EDS.
     """
     given, own = dictionary.description, epos.dictionary().description
     entries = [

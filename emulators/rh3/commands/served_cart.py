@@ -108,8 +108,8 @@ class CartControl(SystemControl):
     Goals and paths are commands of the component PositionInput.
 
     Args:
-        connection: connection to the base, with the RT components. Its time, `now_us`, must not
-            advance while a request is answered.
+        connection: the connected base and its RT components. Its attribute `now_us` must not change
+            while a request is answered.
         cart: the running cart.
     """
 
