@@ -228,7 +228,7 @@ class MonitorSetup:
     """Sources and files that the monitor `canmon tui` was started with.
 
     Attributes:
-        source: SOURCE words that name the source.
+        source: SOURCE arguments of the command, such as the name of a bus or of a log file.
         options: options of the buses.
         eds: paths of EDS files by node-ID.
         dbc: paths of DBC files.

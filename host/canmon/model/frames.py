@@ -132,9 +132,13 @@ def any_ident(frame: CanFrame | FdFrame) -> int:
 
 
 def frame_of(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
-    """Make a frame from an identifier with the flags of `ident_of` or the flag `ERROR`.
+    """Make a frame from numbers.
 
-    The payload is a little-endian number.
+    Args:
+        ident: CAN-ID with the flag bits of `ident_of`. For an error frame: error class with the
+            flag `ERROR`.
+        dlc: data length code.
+        payload: data bytes as one little-endian number.
     """
     data = payload.to_bytes(MAX_DATA_BYTES, "little")
     if ident & ERROR:

@@ -131,9 +131,11 @@ class Thinned(Generic[_T]):
         self.count += 1
 
     def pass_over(self) -> bool:
-        """Count an item that the list would not keep, so that the caller need not create the item.
+        """Count the next item without creating it, if the list would not keep it.
 
-        If the list would keep the item, nothing is counted, and the result is False.
+        Returns:
+            True if the item was counted. The caller then need not create it. False if the list
+            would keep the item. The caller must then create it and call `append`.
         """
         if self.count % self._step == 0:
             return False

@@ -217,7 +217,10 @@ def _word_of(decoded: Decoded) -> str:
 
 
 def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]:
-    """Return the lines of the table of serial traffic in `canmon top`, or no lines without rows."""
+    """Return the table of serial traffic in `canmon top` as lines of text.
+
+    If there are no rows, the result is an empty list.
+    """
     if not rows:
         return []
     names = [f"{row.channel} {ARROWS[row.sent]} {row.word}" for row in rows]

@@ -538,9 +538,11 @@ class Load:
     def take(self, at_us: int, bits: int) -> BusSecond | None:
         """Count the bits of a frame.
 
+        If the frame is later than the current second, this second is complete, and the frame begins
+        a new second.
+
         Returns:
-            If the frame is later than the current second, the bits of this second, which is then
-            complete. Otherwise None.
+            The completed second, or None if no second was completed.
         """
         self._bits += bits
         if at_us < self.begin_us + WINDOW_US:
@@ -552,11 +554,11 @@ class Load:
         return ended
 
     def end(self, end_us: int) -> BusSecond:
-        """Return the last second of the traffic, which may be incomplete.
+        """Return the last second of the traffic, with the number of its bits and its duration.
 
-        The result holds the bits in this second, and the duration for the calculation of the load.
-        This is the real duration of the traffic in this second, if it is at least
-        `LEAST_WINDOW_US`. Otherwise, it is a full second.
+        The traffic may end before the second is complete. If it lasts at least `LEAST_WINDOW_US` in
+        this second, the result contains this real duration. Otherwise, the result contains the
+        duration of a full second. The load is calculated from the bits and the duration.
 
         Args:
             end_us: end of the traffic in microseconds.

@@ -160,10 +160,11 @@ def parse_counter(text: str) -> _Counter:
 
 
 def parse_checksum(text: str) -> _ChecksumField:
-    """Parse the description of a checksum in the data of a frame that is sent repeatedly.
+    """Parse the description of a checksum in the data of a frame.
 
-    It has the form `BYTE:ALGORITHM`, such as `7:crc8`. A range of bytes may follow, as in
-    `7:crc8:1..6`.
+    The description has the form `BYTE:ALGORITHM` or `BYTE:ALGORITHM:FIRST..LAST`, such as `7:crc8`
+    or `7:crc8:1..6`. `BYTE` is the number of the byte with the checksum, from 0. `ALGORITHM` is one
+    of `ALGORITHMS`. The checksum covers the bytes `FIRST` to `LAST`, by default all other bytes.
 
     Raises:
         ValueError: the text is not a checksum.

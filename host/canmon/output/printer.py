@@ -62,10 +62,10 @@ class FilteredDecoder:
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def learning(self, cut: LogCut) -> LogCut:
-        """Return a `LogCut` with which the decoder learns from the frames before the part of a log.
+        """Return a `LogCut` that selects the same part of a log as `cut`.
 
-        The part is the same as that of `cut`. When the log is read with the result, the reader
-        passes the frames before the part to the decoder. The command does not print these frames.
+        With the result, the decoder also learns from the frames before this part: the reader of the
+        log passes these frames to the decoder. The command does not print them.
         """
         if self._decoder is None or cut.begin is None:
             return cut

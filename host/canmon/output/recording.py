@@ -169,7 +169,8 @@ def _check_not_read(path: Path, source: Sequence[str]) -> None:
 def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
     """Write frames into a new log file.
 
-    Return lines that report the number of frames, and items that the format cannot hold.
+    Return lines to display. The first line reports the number of written frames. Further lines
+    report items that the format cannot hold.
 
     Raises:
         ValueError: the file exists already, or cannot be written.
@@ -231,8 +232,10 @@ class RecordingOptions:
     Args:
         path: path of the file.
         options: values of the options by name.
-        bit_rate: bit rate of the bus in bit/s, which a rule about the bus load needs.
-        parts: whether to record in parts, even if no option requires it.
+        bit_rate: bit rate of the bus in bit/s. A trigger needs it if its rule is about the bus
+            load.
+        parts: True to write numbered files with an index in any case. False to do this only if an
+            option such as `rotate` requires it.
 
     Attributes:
         plan: settings of the recording.

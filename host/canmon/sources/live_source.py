@@ -125,7 +125,10 @@ class LiveSource(AnySource[_Item]):
             one.wanted = True
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
-        """Return the name of each bus or port, with its counts of items not read as frames."""
+        """Return a pair for each bus or port: its name and its `LogTally`.
+
+        The tally counts items that are not frames, such as invalid lines.
+        """
         return [(reader.name, reader.tally) for reader in self._readers]
 
     @property

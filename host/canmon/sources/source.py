@@ -182,8 +182,9 @@ class BusSpec:
     is a CAN FD bus.
 
     Attributes:
-        prefix: text before the first colon of the word. This text is the interface. If the option
-            `-i` names another interface, the text belongs to the channel instead.
+        prefix: text before the first colon of the word, such as `slcan` in `slcan:/dev/ttyACM0`.
+            Without the option `-i`, this text names the interface. If `-i` names another interface,
+            this text is the beginning of the channel instead.
     """
 
     interface: str | None = None
@@ -631,10 +632,10 @@ class PieceLog(_LoggedSource):
         return [(str(self._path), self._reader.tally)]
 
     def pieces(self) -> Iterator[Columns | Sequence[Record]]:
-        """Yield the pieces of the file.
+        """Yield the pieces of the file. A piece is a block of columns, or a list of frames.
 
-        After each piece, the attributes `lost` and `marks` have their values at the end of the
-        piece.
+        When a piece is yielded, the attributes `lost` and `marks` have the values for the end of
+        this piece.
         """
         ahead: Columns | Sequence[Item] | None = ()
         while not self._ended:
@@ -666,7 +667,7 @@ class PieceLog(_LoggedSource):
 
 
 def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
-    """Open a log for reading in blocks of columns.
+    """Open a log for reading in blocks of many frames.
 
     The result is None if the SOURCE words do not name exactly one log, or if the log should be read
     frame by frame.

@@ -104,9 +104,12 @@ class RecorderTask(Task):
     def start(self, words: str) -> None:
         """Start a recording. From then on, a bus that goes away is opened again.
 
+        Args:
+            words: name of the file and options, separated by spaces, such as
+                `run.log --rotate 100M`.
+
         Raises:
-            ValueError: the words are not valid arguments of a recording, or a file cannot be
-                written.
+            ValueError: an option or the name of the file is invalid, or a file cannot be written.
         """
         session = self._session
         self.end()

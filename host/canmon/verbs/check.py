@@ -102,12 +102,10 @@ class _FindingPrinter:
     def count(self, frames: int, first_us: int) -> None:
         """Count checked frames.
 
-        If findings are displayed with times since the first frame, the first call sets the time
-        from which they count.
-
         Args:
-            frames: frames to count. There is at least one frame.
-            first_us: time of the first of these frames.
+            frames: number of frames, at least 1.
+            first_us: time of the first of these frames. Findings may be displayed with times since
+                the first frame of the traffic. The first call stores the time of that frame.
         """
         if self._lines is not None and not self.frames:
             self._lines.stamp(first_us)

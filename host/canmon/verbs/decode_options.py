@@ -206,7 +206,7 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
     """Return a decorator that makes a command with SOURCE words, `--strict` and the bus options.
 
     Args:
-        options: further options of the verb, in the order of the help.
+        options: decorators that add the further options of the command, in the order of the help.
     """
     source = click.argument("source", nargs=-1)
     add = add_options(source, *options, strict_option, bus_options, fd_options)

@@ -852,12 +852,14 @@ def of_sdo(ident: npt.NDArray[Any]) -> Ints:
 
 
 class Matter(NamedTuple):
-    """Rows of a block whose frames must be decoded one by one, because they add knowledge.
+    """Rows of the frames in a block that must be decoded one by one.
+
+    A block consists of many frames. Each frame is a row of the block.
 
     Attributes:
-        rows: all these rows. Their frames can change what is known about nodes or CAN-IDs.
-        settling: the part of `rows` with frames that can change the meaning of a CAN-ID, such as
-            SDO frames and boot-ups.
+        rows: rows of the frames that can change what is known about nodes or CAN-IDs.
+        settling: rows of those frames that can change the meaning of a CAN-ID, such as SDO frames
+            and boot-ups. All these rows are also in `rows`.
     """
 
     rows: Ints

@@ -156,8 +156,8 @@ def teaches(entry: tuple[int, int], memory: NodeMemory) -> bool:
     """Return whether the decoder may learn something from the transferred value of an object.
 
     The decoder learns from the values of communication objects, such as COB-IDs and PDO mappings.
-    It also learns from the first transfer of the statusword with 16 bits. Later transfers of the
-    statusword teach nothing.
+    It also learns from a transfer of the statusword, until a statusword with a length of 16 bits
+    is known.
 
     Args:
         entry: index and sub-index of the object.
@@ -210,12 +210,11 @@ class _Frames(NamedTuple):
         """Return the SDO frames of a bus, in which each request is paired with its answer.
 
         Args:
-            frames: frames of the bus.
-            rows: rows of the SDO frames in `frames`.
-            places: one value for each row of `frames`: the row of the same frame in the block with
-                the frames of all buses.
-            side: SDO channel, node-ID, and whether the client sent the frame. Each has one value
-                for each row of `frames`.
+            frames: frames of the bus. They are a part of a block with the frames of all buses.
+            rows: indices in `frames` of the SDO frames.
+            places: index in the block for each frame in `frames`.
+            side: three values for each frame in `frames`: SDO channel, node-ID, and whether the
+                client sent the frame.
         """
         order = np.argsort(side.channel[rows], kind="stable")
         rows = rows[order]
@@ -295,7 +294,8 @@ class ColumnSdo:
     ) -> None:
         """Write the meanings of the SDO frames of one bus into the texts of a block of frames.
 
-        No frame of the bus may change what is known about a node.
+        The caller must not pass frames that change the meaning of a CAN-ID or an object, such as a
+        frame that writes a PDO mapping.
 
         Args:
             frames: frames of the bus in the block.

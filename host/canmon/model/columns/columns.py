@@ -300,10 +300,10 @@ def grown(column: Numbers, count: int) -> Numbers:
 
 
 class ColumnLoad:
-    """Bus load in each second, counted from the first frame, for blocks of frames.
+    """Calculator of the bus load in each second, which processes many frames at once.
 
     Args:
-        first_us: time of the first frame in microseconds.
+        first_us: time of the first frame in microseconds. The first second begins at this time.
 
     Attributes:
         load: bus load calculated so far.

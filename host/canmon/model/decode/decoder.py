@@ -209,10 +209,12 @@ class BusDecoder:
         return self.changes + self.renamed
 
     def sdo(self, can_id: int) -> tuple[SdoChannel, bool] | None:
-        """Return the SDO channel that a CAN-ID belongs to, or None if it has no SDO frames.
+        """Return the SDO channel of a CAN-ID, and whether the client sends its frames.
 
-        With the channel, the result contains True if the client sends the frames, or False if the
-        server sends them. The result is valid until the counter `BusDecoder.changes` grows.
+        The result is a pair of the channel and a bool. The bool is True if the client sends the
+        frames with this CAN-ID, or False if the server sends them. If frames with this CAN-ID are
+        not SDO frames, the result is None. A result is valid until the counter `BusDecoder.changes`
+        grows.
 
         Args:
             can_id: CAN-ID with 11 bits.

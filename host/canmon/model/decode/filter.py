@@ -274,9 +274,11 @@ def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
 
 
 def signal_place(path: str) -> tuple[int | None, str, int | None]:
-    """Split the name of a signal in a filter into node-ID, signal name and bit number.
+    """Split a path that names a signal in a filter, such as `3.statusword.fault`.
 
-    The node-ID is None if no node is named. The bit number is None if no bit is named.
+    The result contains three parts: the node-ID, the name of the signal, and the number of a bit.
+    The node-ID is None if the path contains no node. The number of the bit is None if the path
+    contains no name of a bit.
 
     >>> signal_place("3.statusword.fault"), signal_place("position")
     ((3, 'statusword', 3), (None, 'position', None))
@@ -343,13 +345,13 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Collector of the signals and words in filters that have not occurred in the traffic yet.
+    """List of signals and words that filters contain, and that the traffic has not contained yet.
 
-    If a signal or a word never occurs, it is reported to the user, because it may be misspelt.
+    A signal or word that never occurs may be misspelt. So the command reports it to the user.
 
     Args:
         paths: names of signals in filters, such as `position`, `3.position` or `statusword.fault`.
-        words: comparisons with an unknown word in filters, such as `kind=word`. Each is a pair of
+        words: unknown words that filters compare with a field, as in `kind=word`. Each is a pair of
             the field (`kind`) and the word. A word is unknown if no built-in decoder uses it as a
             value of the field.
     """
@@ -434,7 +436,7 @@ class FilterError(ValueError):
     """Raised if a text is not a valid filter. The message names the column of the error.
 
     Attributes:
-        what: name of the expected text in the message, such as `filter`.
+        what: kind of text that was expected, such as `filter` or `rule`. The message contains it.
         column: column of the error. The first column is 1.
     """
 
@@ -680,9 +682,10 @@ class Filter:
         matches: function that returns whether a frame passes the filter.
         signals: names of the signals in the filter, so that signals that never occur can be
             reported.
-        words: comparisons with an unknown word in the filter, such as `kind=word`. Each is a pair
-            of the field (`kind`) and the word. A word is unknown if no built-in decoder uses it as
-            a value of the field. It is misspelt, or the decoder of an installed package uses it.
+        words: unknown words that the filter compares with a field, as in `kind=word`. Each is a
+            pair of the field (`kind`) and the word. A word is unknown if no built-in decoder uses
+            it as a value of the field. An unknown word may be misspelt. It is correct if the
+            decoder of an installed package uses it.
     """
 
     text: str

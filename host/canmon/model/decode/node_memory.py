@@ -589,8 +589,9 @@ class TwoBeats(NamedTuple):
 
     Attributes:
         period_us: period of each of the two heartbeats in microseconds.
-        places: index of each gap that differs in length from the next gap, if the sum of these two
-            gaps is about one period. Gap n begins with frame n.
+        places: indices of gaps. Each of these gaps meets two conditions: it differs in length from
+            the next gap, and its sum with the next gap is about one period. Gap n begins with
+            frame n.
     """
 
     period_us: int

@@ -289,9 +289,12 @@ class CurveSpec:
 def parse_signal(text: str) -> CurveSpec:
     """Parse the request for a curve, which has the form `[LABEL=]SIGNAL[@AXIS]`.
 
-    `LABEL` is the displayed name of the curve. `SIGNAL` is bits of a frame, such as
-    `181[2:6]s*0.001`, an object, such as `3.position`, or one of `BUS_SIGNALS`, such as `load` or
-    `3.nmt`. `AXIS` is the number of the vertical axis, 1 by default.
+    `LABEL` is the displayed name of the curve. `AXIS` is the number of the vertical axis, 1 by
+    default. `SIGNAL` is one of these:
+
+    - Bits of a frame, for example `181[2:6]s*0.001`.
+    - An object, for example `3.position`.
+    - One of `BUS_SIGNALS`, for example `load` or `3.nmt`.
 
     Args:
         text: text of the request.

@@ -412,7 +412,8 @@ class _AscWriter:
         - The block contains error frames.
         - A frame of the block is earlier than the first frame of the log. If the log is empty: a
           frame of the block is earlier than the first frame of the block.
-        - A time is too long to be exact as a floating-point number.
+        - The time of a frame is so large that a floating-point number of seconds is not exact to
+          the microsecond.
         """
         first_us, earliest_us = block.first_us, block.earliest_us
         begin_us = self._begin_us

@@ -393,11 +393,9 @@ class LogLines:
     def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
         """Count lines that a faster parser has read, so that this parser can continue after them.
 
-        `holds_frame` is true for each of these lines.
-
         Args:
-            lines: number of lines.
-            latest_us: time of the last frame in the lines, or None if they hold no frame.
+            lines: number of lines. `holds_frame` must be True for each line.
+            latest_us: time of the last frame in the lines, or None if no line is valid.
             unusual: whether `is_usual` is False for at least one of the lines.
         """
         self.number += lines

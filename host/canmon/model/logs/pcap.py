@@ -219,8 +219,8 @@ class _PcapngReader:
             begun: bytes at the beginning of the file that were already read.
 
         Raises:
-            LogError: the file is truncated or damaged. It is raised after all frames before the
-                damage.
+            LogError: the file is truncated or damaged. The frames before the damage are yielded
+                first.
         """
         more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
         while more:

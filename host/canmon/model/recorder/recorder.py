@@ -47,7 +47,12 @@ class Trigger(Protocol):
         """Return the reason why a frame is a trigger, or an empty text if it is not."""
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Return the reason to trigger because of missing or lost frames, or an empty text."""
+        """Return a reason if missing or lost frames start the recording, otherwise an empty text.
+
+        Args:
+            now_us: current time.
+            lost: total number of frames lost so far.
+        """
         return ""
 
     def messages(self) -> list[str]:
@@ -337,7 +342,8 @@ class Recorder:
         The result is False if the caller must pass the frames to `take` one by one.
 
         Args:
-            block: block of at least one frame. No event may follow the frames.
+            block: block of at least one frame. If the log has marks after these frames, such as
+                lost frames, the caller must use `take` instead.
             now_us: current time.
         """
         whole = self._before is None and self._wanted is None

@@ -199,7 +199,13 @@ _CODE: Final = re.compile("\x1b\\[([0-9]*)m")
 
 
 def ansi_line(text: str, styles: Mapping[str, str]) -> Line:
-    r"""Return a line with the styles of its ANSI codes. A style lasts until the next code.
+    r"""Convert a text with ANSI codes to a line with styles. The line does not contain the codes.
+
+    Each code sets the style of the text between this code and the next code.
+
+    Args:
+        text: text with ANSI codes.
+        styles: style for each code. Other codes set no style.
 
     >>> ansi_line("01 \x1b[7mFF\x1b[0m", {"7": "bold yellow"})
     (('01 ', ''), ('FF', 'bold yellow'))
@@ -307,7 +313,7 @@ class Panel(Vertical):
 
 
 class SendingPanel(Panel):
-    """Base class of tabs that send frames, on one bus at a time that the user selects.
+    """Base class of tabs that send frames on a bus. The user selects the bus.
 
     Args:
         session: session with the traffic and the buses to send on.
