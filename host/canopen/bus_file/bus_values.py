@@ -44,7 +44,7 @@ class BusWrite:
         index: index of the object, 0x0000..0xFFFF.
         sub_index: sub-index of the object, 0..255.
         data: bytes that the master writes, little endian.
-        place: file and line of the bus.yml that requires the write.
+        place: path of the bus.yml, and number of its line that requires the write.
     """
 
     index: int

@@ -58,8 +58,9 @@ class BusFileNotes:
     def all(self) -> tuple[RuleFinding, ...]:
         """All errors and warnings in the order of their lines.
 
-        A misspelt key is reported as an unknown key. Other errors that the misspelt key may cause
-        in the same line, such as a missing value, are left out.
+        A misspelt key is reported as an unknown key. Errors in the same line that may only be a
+        consequence of the misspelt key are left out. For example, if the key `value` is misspelt,
+        it is not reported that the value is missing.
         """
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}

@@ -231,8 +231,8 @@ class Writes:
             index: index of the object.
             sub: sub-index of the object.
             value: value that the bus.yml gives.
-            place: file and line of the bus.yml that requires the write.
-            said: value as it is written in that line of the bus.yml.
+            place: path of the bus.yml, and number of its line that requires the write.
+            said: text of the value in this line.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)

@@ -93,8 +93,8 @@ def writes(
     Args:
         values: wanted value of each object, by index and sub-index.
         number: function that reads an object of the node as an unsigned number.
-        writable: objects that the host can write. Writes to other objects are left out. This
-            includes temporary writes, such as a write that disables a PDO while its parameters
+        writable: objects that the host can write. The result contains no writes to other objects,
+            not even temporary writes, such as a write that disables a PDO while its parameters
             change.
 
     Raises:

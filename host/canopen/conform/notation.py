@@ -87,7 +87,7 @@ class _Names(Protocol):
         ...
 
     def address(self, name: str, /) -> Address:
-        """Return the index and sub-index of the object that replaces a name in a check.
+        """Return the index and sub-index of the object that a name in a check stands for.
 
         Raises:
             Unbound: the node has no such object.
@@ -244,10 +244,10 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return the text of a failed step. The error message of the step begins with this text.
+    """Return the beginning of the error message for a failed step: a description of the step.
 
-    The text does not contain the expected abort codes. If the step only sends, expects or drops
-    frames, or waits, the text is empty.
+    The description does not contain the expected abort codes. For a step that only sends, expects
+    or drops frames, or that only waits, the result is an empty text.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():

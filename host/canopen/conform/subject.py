@@ -44,7 +44,8 @@ def other_device(device: EdsDevice | None, about: Mapping[str, str]) -> str:
     A difference means that the EDS belongs to another device.
 
     Args:
-        device: device that the EDS describes, or None without an EDS. A value of 0 is not compared.
+        device: device that the EDS describes, or None without an EDS. If the EDS gives the value 0
+            for a property, the property is not compared.
         about: properties that the node has reported, as texts by name.
     """
     entries = device.entries if device else ()
@@ -335,7 +336,7 @@ class Subject:
         names: helper that replaces a name in a step by a text or an object address. It uses
             `binding`.
         about: properties that the node has reported, such as its device name, as texts by name.
-        values: index and sub-index of each object that can be read and written.
+        values: objects whose values can be read and written, by index and sub-index.
         refused: mandatory objects that the node refuses to read.
     """
 

@@ -75,10 +75,10 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return a text about the first non-ASCII byte of a line, as part of a finding.
+        """Describe the first non-ASCII byte of a line. The description is part of a finding.
 
-        An EDS does not name its encoding. The text lists the possible encodings, and the letter
-        that the byte stands for in each of them.
+        An EDS does not name its encoding. So the description lists the possible encodings, and the
+        letter that the byte stands for in each of them.
         """
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")

@@ -49,7 +49,7 @@ class _Fixed:
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
-    """Correct the errors and warnings of an EDS that need no knowledge about the device.
+    """Correct errors and warnings of an EDS, if this is possible without knowledge of the device.
 
     Lines without findings keep all their bytes. A file that looks truncated is not changed, because
     it would look complete after a fix. A file in another encoding than Unicode is converted to

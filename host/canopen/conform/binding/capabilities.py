@@ -65,12 +65,12 @@ _DUMMIES: Final = {"dummy5": "dummy0005", "dummy6": "dummy0006"}
 
 
 class EdsClaims(NamedTuple):
-    """Capabilities of a node that only its EDS states, in addition to the list of objects.
+    """Capabilities of a node that its EDS states outside the list of objects.
 
     Attributes:
         lss: whether the node supports LSS.
-        dummies: dummy objects that the node allows in a PDO mapping, by their names in checks, such
-            as `dummy5`.
+        dummies: names of the dummy objects that the node allows in a PDO mapping, such as `dummy5`.
+            Checks use the same names.
         identity: vendor-ID, product code and revision number of the identity object 1018h, by
             sub-index. They come from the section DeviceInfo of the EDS, and numbers that are
             missing there are left out.

@@ -41,10 +41,10 @@ class Use(Enum):
 
 
 class EntryFacts(NamedTuple):
-    """Properties of an object dictionary entry that decide which names in checks it can replace.
+    """Properties of an object dictionary entry that decide which names can stand for the entry.
 
-    The properties are calculated once per entry, and then compared with the requirements of every
-    name.
+    A check contains a name in place of an index and sub-index. A name can stand for an entry if the
+    properties of the entry meet the requirements of the name.
 
     Attributes:
         entry: entry of the object dictionary.
@@ -98,10 +98,10 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the objects of a node that can take the place of this name, in the given order.
+        """Return the objects of a node that this name can stand for, in the order of `facts`.
 
-        A check contains the name in place of an index and sub-index. The run replaces the name by
-        one of these objects.
+        A check contains the name in place of an index and sub-index. When the check is executed,
+        the name stands for one of these objects.
 
         If checks write to the object and restore it (`Use.WRITE`), they may write any value between
         its limits. For such a name, a communication object (1000h to 1FFFh) is in the result only

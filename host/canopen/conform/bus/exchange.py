@@ -344,9 +344,9 @@ class BusExchange:
     def end_listening(self) -> None:
         """Detect other nodes only by their heartbeat from now on.
 
-        Before this call, each frame with a CAN-ID of another node shows that this node exists.
-        During the checks, the node under test may send such frames itself, so they no longer show
-        this.
+        Before this call, a frame with a CAN-ID of another node shows that the other node exists.
+        During the checks, the node under test may send frames with such CAN-IDs itself. So, apart
+        from heartbeats, they are no longer evidence of another node.
         """
         self._others_by = _HEARTBEATS
 

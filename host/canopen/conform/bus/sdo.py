@@ -79,9 +79,9 @@ class SdoClient:
             self.run(download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
-        """Read an object as an unsigned number of at most 32 bits.
+        """Read an object as an unsigned number of 1 to 4 bytes.
 
-        Return None if the transfer fails, or if the value has another length.
+        Return None if the transfer fails, or if the value has no bytes or more than 4 bytes.
         """
         try:
             return number_of(self.upload(index, sub))

@@ -197,10 +197,10 @@ def unwell(report: Report) -> list[Result]:
 
 
 def causes(results: Iterable[Result]) -> list[list[Result]]:
-    """Combine results that probably have the same cause, so that a report shows the cause once.
+    """Group check results that probably have the same cause, so that a report shows it only once.
 
-    The result contains lists. Object checks of the same kind that fail for the same reason are in
-    one list. Each of the other results is alone in a list.
+    Object checks of the same kind that fail for the same reason are one group. Each of the other
+    check results is a group of its own.
     """
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):
