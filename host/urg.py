@@ -34,7 +34,9 @@ class UrgScan:
     specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
-        """Return the direction of a distance in radians. 0 is straight ahead, and left is positive.
+        """Return the direction in which the sensor measured a distance, in radians.
+
+        The direction is 0 straight ahead, and positive to the left.
 
         Args:
             place: number of the distance in `distances_mm`, from 0.

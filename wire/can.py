@@ -430,7 +430,7 @@ class FdBits(NamedTuple):
 
     Attributes:
         nominal: number of bits at the nominal bit rate, with the interframe space.
-        fast: number of bits at the data bit rate, which is 0 in a frame without BRS.
+        fast: number of bits at the data bit rate. In a frame without BRS, this number is 0.
     """
 
     nominal: int

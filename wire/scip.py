@@ -211,8 +211,8 @@ class Command:
     Attributes:
         symbol: symbol of two letters, such as `MD`.
         parameters: all parameters, one after the other.
-        string: text that the host adds and the reply repeats, with its semicolon, or empty if there
-            is no such text.
+        string: semicolon and a text that the host may add to the command. The sensor repeats the
+            text in its reply. `string` is empty if the host adds no text.
     """
 
     symbol: str

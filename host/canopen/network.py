@@ -170,7 +170,9 @@ class NodeSession:
         return None
 
     def run(self, script: dialogue.Script[T], listen: _Listen) -> T:
-        """Run a script of requests with the node to its end. Return its result, or raise its error.
+        """Send the requests of a script to the node, and wait until the script ends.
+
+        Return the result of the script. If the script ends with an error, raise this error.
 
         Args:
             script: script to run. No other script runs at the same time.

@@ -211,7 +211,7 @@ def bus_and_rest(
 
 
 def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
-    """Open the CAN bus that the command line names, as a python-can object.
+    """Open the CAN bus that the command line names, with python-can.
 
     Args:
         options: bus options of the command line.

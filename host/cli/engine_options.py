@@ -182,8 +182,8 @@ def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
 
     Args:
         options: options of the command line by name. The options of OpenRTM and ROS 2 are removed.
-        topics: text of the table that assigns ROS 2 topics to ports if the user names no table. If
-            it is empty, each port has a topic.
+        topics: text of the default table. A table assigns ROS 2 topics to ports. If the user names
+            no table, the default table applies. If the default is empty, each port has a topic.
 
     Raises:
         Refused: an option is invalid, or it belongs to OpenRTM or ROS 2 but the user did not

@@ -47,7 +47,7 @@ class ExtensionGroup(Generic[T]):
         return [*self.built_in, *sorted({point.name for point in self._foreign()})]
 
     def load(self, name: str) -> T:
-        """Import and return the extension with a name.
+        """Import the extension that has the given name, and return it.
 
         Raises:
             ExtensionError: there is no extension of this name, or it cannot be loaded.

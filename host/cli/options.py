@@ -196,8 +196,8 @@ class LazyGroup(HarmlessCommand, click.Group):
     """Click group that imports the module of a subcommand only when the subcommand is needed.
 
     Args:
-        commands: location (`MODULE:NAME`) and short help of each subcommand by name, in the order
-            of the list.
+        commands: mapping from the name of each subcommand to its location (`MODULE:NAME`) and its
+            short help. The help of the group lists the subcommands in the order of the mapping.
         attributes: further arguments of `click.Group`.
     """
 
@@ -208,7 +208,7 @@ class LazyGroup(HarmlessCommand, click.Group):
         super().__init__(commands=awaited, **attributes)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order of the list."""
+        """Return the names of the subcommands, in the order of the mapping `commands`."""
         return list(self.commands)
 
     def resolve_command(

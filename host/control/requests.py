@@ -92,7 +92,7 @@ def whole(value: object, key: str, low: int, high: int) -> int:
 
     Args:
         value: value in the request.
-        key: key of the value, for the message.
+        key: key of the value in the request. The error message contains the key.
         low: lowest allowed value.
         high: highest allowed value.
 

@@ -77,7 +77,7 @@ class EchoFreeLink:
     def receive(self, timeout_us: int, /) -> Frames:
         """Wait for frames, and return those of other nodes.
 
-        If only echoes arrive, the result is empty, possibly before the timeout.
+        If only echoes arrive, the result is empty. Then this method may return before the timeout.
         """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 

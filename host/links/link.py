@@ -78,9 +78,9 @@ W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 class Link(Protocol[W]):
     """Connection between a proxy and its device, which may be real or emulated, with a clock.
 
-    A proxy is the host's object for a device. It reads the time from its link, never from the clock
-    of the machine. If the emulated device runs in virtual time, the same proxy waits a minute of
-    virtual time within a millisecond.
+    A proxy is the host's object for a device. The proxy reads the time from its link, never from
+    the clock of the machine. So a proxy also works with an emulated device in virtual time. It then
+    waits for a minute of virtual time within a millisecond of real time.
     """
 
     @property

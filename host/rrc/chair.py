@@ -244,7 +244,10 @@ class Chair(Closing):
         self.client.close()
 
     def leave_driving(self) -> None:
-        """Let the wheelchair's stick drive on after the end of the program, without a watchdog."""
+        """Do not stop the wheelchair at the end of the program.
+
+        The user can then continue to drive it with its stick. The RRC's watchdog is off.
+        """
         self.moved = False
 
     def _leave(self) -> None:

@@ -382,10 +382,11 @@ class RrcClient(Closing):
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
         """Let this program drive. If the stick was driving, select the slowest speed mode first.
 
-        The RRC manual advises the slowest speed mode whenever the driver changes. The stick drives
-        after the command `limit`, and this program drives by the command `output`. The first
-        `output` after the change waits until the RRC has confirmed the command. The slowest speed
+        The RRC manual advises the slowest speed mode whenever the driver changes. The slowest speed
         mode stays selected. If you want another speed mode, select it after this call.
+
+        This method sends the command `output`. If the stick was driving, the method waits until the
+        RRC has confirmed this command.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.

@@ -170,14 +170,15 @@ class _UnconfirmedCommands:
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Process an OK to a command with this name.
+        """Process an OK of the RRC to a command with this name.
 
-        Several commands with the same name may wait for an answer. The OK belongs to the oldest of
-        these commands, which is removed.
+        Several commands with this name may wait for an answer. The OK answers the oldest of them.
+        So the oldest command is removed.
 
         Returns:
-            The newest of these commands. The RRC executes the newest command last, so its values
-            will apply. None if no command with this name is waiting.
+            The newest command with this name. The RRC executes the newest command last. So the
+            values of the newest command will apply. If no command with this name waits, the result
+            is None.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:

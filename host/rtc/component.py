@@ -631,12 +631,13 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def join(self, others: ExecutionContexts) -> None:
-        """Make this execution context a member of a group that a schedule ticks.
+        """Store the group to which this execution context belongs.
 
         The methods `ExecutionContexts.add` and `ExecutionContexts.remove` call this method.
 
         Args:
-            others: group of contexts, which is notified when the due time of this context changes.
+            others: the group. When the due time of this context changes, this context notifies the
+                group.
         """
         self._ticked_us, self._others = self.now_us, others
 

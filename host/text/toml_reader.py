@@ -109,10 +109,10 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table that this table has at a key. A header `[key.b]` needs it.
+        """Return the table at `key`, to read a header such as `[key.b]`.
 
-        A missing table is created. If the key has an array of tables, the last table of the array
-        is returned.
+        A missing table is created. If there is an array of tables at the key, the last table of the
+        array is returned.
 
         Raises:
             _TakenError: the key has a value that is not a table.
@@ -149,13 +149,13 @@ class _Table:
         return table
 
     def dotted(self, line: int, key: str) -> _Table:
-        """Return the table that this table has at a key. A line `key.b = 1` needs it.
+        """Return the table at `key`, to read a line such as `key.b = 1`.
 
         A missing table is created.
 
         Raises:
-            _TakenError: the key has a value that is not a table, or the key has a table with a
-                header `[key]`. TOML does not allow a dotted key to add to such a table.
+            _TakenError: the value at the key is not a table, or the header `[key]` has already
+                created this table. TOML allows no such line then.
         """
         node = self.entries.setdefault(key, _Table(line))
         if not isinstance(node, _Table) or node.closed or node.frozen:

@@ -25,8 +25,8 @@ class Parameter:
         width: number of hex digits, 1 or 2.
         low: smallest value. A value below 0 is written in two's complement.
         high: largest value.
-        values: mapping from hex digits, as bytes, to the value of these digits. It has only allowed
-            values, and a key for each spelling of a value in upper, lower and mixed case.
+        values: mapping from hex digits (as bytes) to the value of these digits. Only allowed values
+            are in the mapping. The hex digits can be in upper, lower or mixed case.
     """
 
     __slots__ = ("high", "low", "values", "width")

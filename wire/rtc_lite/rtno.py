@@ -192,10 +192,9 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 class RtnoReplies(RtnoPacketDecoder):
     r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy on a PC.
 
-    It is used like `LiteDecoder(REPLIES)`. RTno packets lack some parts of the RTC-Lite frames. A
-    reply with a state has no status. A reply to a command has no state. The profile of a component
-    has no numbers of ports and no type. This decoder adds the missing parts if it can compute them
-    from the other parts. The state after a refused command is unknown, so it is written as `?`.
+    It is used like `LiteDecoder(REPLIES)`. RTno packets lack some parts of the RTC-Lite frames,
+    such as the number of ports. This decoder adds the missing parts if it can compute them from the
+    other parts. The component's state after a refused command is unknown, so it is written as `?`.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]

@@ -119,13 +119,14 @@ class PdoDataFlow:
 
 
 class SdoDataFlow:
-    """Transfer of values between objects of devices and ports by SDO.
+    """Transfer of values by SDO between the ports of proxies and the objects of devices.
 
-    Objects are read for OutPorts of the proxies, and values at InPorts are written to objects.
-    Values are transferred while the proxy is Active and its device is Operational. The server runs
-    the proxies periodically, and for each port at most one value is transferred per period. If the
-    transfers of a proxy take longer than a period, the next transfers of this proxy begin in the
-    first period after the end of the earlier ones.
+    A proxy is an RT component that represents a device. For an OutPort of the proxy, an object of
+    the device is read. For an InPort, an object is written. Values are transferred while the proxy
+    is Active and its device is Operational.
+
+    In each period of the server, at most one value is transferred per port. If the transfers of a
+    proxy take longer than a period, the proxy begins no new transfers until they have ended.
 
     Args:
         nodes: nodes by node-ID.

@@ -75,8 +75,8 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
             are no devices. Afterwards, do not use this server for anything else.
 
     Returns:
-        A text for each error. An error is a setting that a node will refuse, or a COB-ID with which
-        several nodes send a PDO, although no node refuses this COB-ID.
+        A text for each error. For example, a node will refuse a setting, or several nodes send a
+        PDO with the same COB-ID.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():

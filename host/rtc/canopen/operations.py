@@ -312,9 +312,8 @@ class NodeOperations:
         Return False if no restart is left.
 
         Args:
-            to_start: whether the server will activate the node even if no restart is left. If this
-                is false and no restart is left, an event tells the user to reset or activate the
-                node.
+            to_start: whether the server will activate the node in any case. If this is False and no
+                restart is left, an event tells the user to reset or activate the node.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

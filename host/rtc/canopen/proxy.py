@@ -228,7 +228,7 @@ class _SdoPortLayout:
 
 
 class SdoSource:
-    """An object of a device that is read by SDO, with the proxy's OutPort that gets its value.
+    """An OutPort of a proxy, and the object of the device that is read by SDO for this OutPort.
 
     Attributes:
         layout: layout of the object.
@@ -240,7 +240,7 @@ class SdoSource:
 
 
 class SdoSink:
-    """An object of a device that is written by SDO, with the proxy's InPort for its value.
+    """An InPort of a proxy, and the object of the device to which its values are written by SDO.
 
     Attributes:
         layout: layout of the object.
@@ -268,7 +268,7 @@ class SdoSink:
 def lay_out_sdo_ports(
     entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
 ) -> tuple[tuple[_SdoPortLayout, ...], tuple[str, ...]]:
-    """Return the layouts of a node's ports that are transferred by SDO.
+    """Return the layouts of those ports of a node whose values are transferred by SDO.
 
     Args:
         entry: settings of the node.
@@ -325,7 +325,10 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
-    """Request of a proxy to its device that the server has not sent to the bus yet."""
+    """What a proxy wants the server to do with the device, such as to activate it.
+
+    The server has not sent anything for this request to the bus yet.
+    """
 
     NOTHING = auto()
     ACTIVATE = auto()

@@ -224,7 +224,10 @@ class NodeServer(Protocol):
         """Schedule a tick of the node at `due_us`."""
 
     def booted(self, node: ServedNode, /) -> None:
-        """Create the proxy of a booted node if it has none, and make its links and connections."""
+        """Create the proxy of a booted node if it has none.
+
+        Then make the PDO links of the node, and the connections of the proxy to other components.
+        """
 
     def gone(self, node: ServedNode, /) -> None:
         """Remove the proxy."""

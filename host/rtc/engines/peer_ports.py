@@ -105,8 +105,8 @@ class PeerEnd:
     Attributes:
         port: name of the port in the other process, such as `other/ConsoleOut0.rtc:in`.
         connector_id: ID that is unique in this system.
-        properties: properties `dataport.*`, as for `ConnectorOptions.parse`. Other properties are
-            kept.
+        properties: properties of the connector. `ConnectorOptions.parse` describes the properties
+            `dataport.*`. The connector's profile contains these and all other properties.
         name: name of the connector for display. By default, it is the ID.
     """
 
@@ -517,10 +517,10 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         The value is sent later.
 
         Returns:
-            If the value cannot be encoded: INVALID_ARGS. If the buffer does not accept the value:
-            the status of the buffer. If the buffer accepts the value: the status of the value that
-            was sent last. The other process has returned this status, such as PORT_OK or
-            BUFFER_FULL. If the other process did not answer, the status is CONNECTION_LOST.
+            INVALID_ARGS if the value cannot be encoded. The status of the buffer if the buffer does
+            not accept the value. Otherwise, the status of an earlier value, because this value is
+            not sent yet: the status that the other process returned for the value sent last, such
+            as PORT_OK or BUFFER_FULL, or CONNECTION_LOST if the other process did not answer.
         """
         try:
             payload = self._codec.encode(value)
@@ -575,14 +575,14 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         return self.buffer.write(payload)
 
     def get(self) -> tuple[PortStatus, P | None]:
-        """Remove the next value from the buffer and return it, for the other process.
+        """Remove the next value from the buffer and return it.
 
-        Any thread may call.
+        This process calls the method when the other process fetches a value. Any thread may call.
 
         Returns:
             A status and the encoded value. The status is PORT_OK if there is a value, BUFFER_EMPTY
-            if the buffer is empty, and CONNECTION_LOST after the end of the connector. Without
-            PORT_OK, the value is None.
+            if the buffer is empty, and CONNECTION_LOST if the connector has been removed. Unless
+            the status is PORT_OK, the value is None.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

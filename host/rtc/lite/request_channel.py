@@ -296,8 +296,8 @@ class RequestChannel:
     def request_again(self, command: codes.LiteCommand) -> messages.LiteReply | None:
         """Send a request up to 4 times until the device replies, and return the reply or None.
 
-        A missing reply does not start a burst of PINGs. A fault reply means that earlier bytes on
-        the line have corrupted the request. So the request is then sent again, too.
+        The request is also sent again after a fault reply, because earlier bytes on the line have
+        then corrupted the request. Unlike `request`, this method never sends PINGs.
         """
         reply = self._exchange(command)
         for _ in range(RETRIES):

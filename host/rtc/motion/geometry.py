@@ -18,9 +18,9 @@ class Pose(NamedTuple):
         return (point.x - self.x) * cos(self.heading) + (point.y - self.y) * sin(self.heading)
 
     def left(self, point: Pose) -> float:
-        """Return the distance of a point to the left of the line through this pose.
+        """Return how far a point is to the left of this pose, at right angles to its heading.
 
-        If the point is to the right of the line, the distance is negative.
+        If the point is to the right, the result is negative.
         """
         return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
 

@@ -98,12 +98,16 @@ class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
 
 
 class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
-    """Component that converts robot positions from phase 2 to phase 3 of the IIS interfaces."""
+    """Component that converts the position of a robot from IIS phase 2 to IIS phase 3.
+
+    IIS is a set of common interfaces for mobile robots. Phase 2 and phase 3 are two versions of IIS
+    with different data types.
+    """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
-        """Return the position in the data type of IIS phase 3, or None if a number is invalid.
+        """Return the position as `iis.TimedPose2D`, or None if a number is invalid.
 
         The heading of the result is in 0..2 pi.
         """
@@ -114,12 +118,12 @@ class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
 
 class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
-    """Component that converts robot positions from IIS phase 3 (or RH3) to IIS phase 2."""
+    """Component that converts the position of a robot from IIS phase 3 (or RH3) to IIS phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
-        """Return the position in the data type of IIS phase 2, or None if a number is invalid.
+        """Return the position as `iis.TimedPosition`, or None if a number is invalid.
 
         The heading of the result is in 0..2 pi.
         """

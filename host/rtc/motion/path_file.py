@@ -56,15 +56,15 @@ def parse_points(text: str) -> list[Pose]:
 
 
 def in_degrees(numbers: Sequence[float], text: str) -> Pose:
-    """Return the pose of two or three typed numbers: x and y in metres, heading in degrees.
+    """Return a pose from numbers that a user typed: x and y in metres, heading in degrees.
 
     Args:
         numbers: two or three numbers. Without a third number, the heading is 0.
-        text: text of the numbers, for messages.
+        text: text that the user typed, for messages.
 
     Raises:
-        ValueError: there are not two or three numbers, a number is invalid, or the pose is farther
-            away than `FARTHEST_M`.
+        ValueError: there are not two or three numbers, a number is invalid, or the pose is more
+            than `FARTHEST_M` metres from the origin.
     """
     if len(numbers) not in (2, 3) or not plausible(*numbers):
         raise ValueError(f"{text!r} is not X Y in metres, and a heading in degrees")

@@ -122,8 +122,9 @@ class InPort(DataPort[T]):
         """Return the next unread value and remove it from its buffer, without waiting.
 
         Returns:
-            The next value. If there is no new value, the result is the value of the last read. It
-            is None if nothing was read yet, or if the connector's `empty_policy` is not `readback`.
+            The next value. If there is no new value, the result depends on the `empty_policy` of
+            the connector. With `readback`, the result is the value of the last read, or None if
+            nothing was read yet. With any other policy, the result is None.
         """
         for connector in self.connectors:
             if connector.buffer.readable:

@@ -220,13 +220,13 @@ class Port(Generic[C]):
         self.connectors = tuple(c for c in self.connectors if c is not connector)
 
     def notify(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
-        """Call functions of `on_connect` or `on_disconnect` with the profile of a connector.
+        """Call functions with the profile of a connector.
 
-        An exception of such a function is logged.
+        If a function raises an exception, the exception is logged.
 
         Args:
-            listeners: functions to call.
-            profile: profile of the connector.
+            listeners: functions to call: the list `on_connect` or `on_disconnect` of the port.
+            profile: profile of the connector that was made or removed.
         """
         call_listeners(self.full_name, listeners, profile)
 

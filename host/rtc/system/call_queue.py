@@ -26,14 +26,15 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 
 
 class CallQueue:
-    """Queue of calls from other threads, which the manager's thread executes between its ticks.
+    """Queue of calls that other threads want the manager's thread to execute.
 
-    Other threads use it because only the manager's thread may access a manager. The manager's
-    thread executes the calls in one of two ways. With a `ServingClock`, the clock calls `serve`
-    while it waits for the next tick. With a `LineServer` (the server of a control socket), the
-    thread calls `server.attach(queue, queue.make)` once. From then on, the server watches the queue
-    while it waits for clients. When the queue contains calls, the server calls `queue.make`, which
-    executes them.
+    Only the manager's thread may access a manager. So other threads put their calls into this
+    queue. The manager's thread executes the calls while it waits for its next tick. You set this up
+    in one of two ways:
+
+    - With a `ServingClock`, set the attribute `serve` of the clock to the method `serve` of the
+      queue.
+    - With a `LineServer` (the server of a control socket), call `server.attach(queue, queue.make)`.
     """
 
     def __init__(self) -> None:

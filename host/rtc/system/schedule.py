@@ -155,7 +155,8 @@ class Clock(Protocol):
             t_us: time in us.
 
         Returns:
-            The time in us by which this method returns too late, or 0 if it returns on time.
+            The delay in us: the time from `t_us` to the return of this method. The delay is 0 if
+            the method returns on time.
         """
         ...
 

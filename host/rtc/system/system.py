@@ -98,8 +98,8 @@ def restore(manager: Manager, system: System) -> None:
     """Create the components and connectors that a system description lists, in a manager.
 
     Components that are marked as active are activated. Connectors to components in other processes
-    are only listed in `manager.remotes`. Later the code that connects to other processes (an
-    engine, such as OpenRTM-aist) makes these connectors.
+    are only listed in `manager.remotes`. An engine makes them later. An engine is code that
+    connects to other processes, such as the code for OpenRTM-aist.
 
     Raises:
         RtcRefused: a component or connector cannot be created. All created components are then
@@ -120,8 +120,9 @@ def with_remotes(system: System, types: Container[str]) -> System:
     """Return a copy of a system description, with components of unknown types as remote components.
 
     An RTSProfile can describe a system that several processes run. If this process cannot create a
-    component, the component runs in another process. Only a component with a path can become a
-    remote component.
+    component, the component runs in another process. Then this process needs the path of the
+    component, such as `localhost:2809/robot.host_cxt/Joystick0.rtc`. A component of an unknown type
+    without a path stays unchanged.
 
     Args:
         system: system description that was read.

@@ -63,7 +63,8 @@ def write_eds(
             from the product name.
 
     Raises:
-        ValueError: a name cannot be written to an EDS, or CiA 306 has no word for an access.
+        ValueError: the name of an object cannot be written to an EDS, or CiA 306 has no word (such
+            as `rw`) for the access of an object.
 
     >>> from tickrig.wire.canopen.eds.object_table import ObjectTable
     >>> text = write_eds(ObjectTable())
@@ -209,7 +210,8 @@ def entry_lines(entry: object_table.EntryDescription) -> list[str]:
     """Return the lines of an EDS that describe one sub-index.
 
     Raises:
-        ValueError: a name cannot be written to an EDS, or CiA 306 has no word for an access.
+        ValueError: the name of the sub-index cannot be written to an EDS, or CiA 306 has no word
+            (such as `rw`) for the access of the sub-index.
 
     >>> from tickrig.wire.canopen.eds.object_table import RO, DataType
     >>> entry_lines(object_table.EntryDescription(0x2000, 1, "x", DataType.UNSIGNED8, RO))[:2]

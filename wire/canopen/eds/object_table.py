@@ -324,8 +324,8 @@ class ObjectTable:
             elements: descriptions of its sub-indices from 1 on.
             count_access: access of sub-index 0.
             count: value of sub-index 0, or None for the highest sub-index of the elements.
-            code: object code. An array may also be added here, if its elements have individual
-                names and defaults.
+            code: object code. With the object code of an array, this method adds an array whose
+                elements have individual names and defaults.
         """
         rows = list(elements)
         highest = max(row.sub for row in rows) if count is None else count

@@ -112,9 +112,10 @@ def is_number(section: str, key: str) -> bool:
 
 
 def keys_of(section: str) -> dict[str, str] | None:
-    """Return the keywords that CiA 306 allows in a section, by their names in lower case.
+    """Return the keywords that CiA 306 allows in a section.
 
-    The result is None if the section may have any keyword.
+    A key of the mapping is a keyword in lower case. Its value is the correct spelling, such as
+    `FileName`. The result is None if the section may have any keyword.
     """
     if object_section(section) is not None:
         return _OBJECT
@@ -126,7 +127,7 @@ def keys_of(section: str) -> dict[str, str] | None:
 def numbered(section: str, key: str) -> str | None:
     """Return the correct spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`.
 
-    The result is None if a section with this title cannot have such a keyword.
+    The result is None if the section cannot have this keyword.
 
     >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
     ('Line5', 'Dummy001B', None)

@@ -113,9 +113,8 @@ async def home(
         name: name of the joint, for messages.
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
-        caught_up: function that returns an operation to await. The operation ends when the drive
-            has received the latest controlword and has then sent a statusword. So this statusword
-            does not show the state before the controlword.
+        caught_up: function that returns an operation to await. The drive receives the latest
+            controlword, and then sends a statusword. This statusword ends the operation.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.

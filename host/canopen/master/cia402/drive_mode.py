@@ -34,7 +34,7 @@ class ModeNumber(IntEnum):
 
     @classmethod
     def of(cls, mode: int | str) -> ModeNumber:
-        """Return the mode with a number, or with an abbreviation such as `pp` (profile position).
+        """Find a mode by its number, or by its abbreviation such as `pp` (profile position).
 
         Raises:
             ValueError: there is no such mode.

@@ -169,9 +169,13 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
 
 
 def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
-    """Open the log file, and yield one function, which writes a server event to this file.
+    """Yield the listener for the option `--log`. Without this option, yield nothing.
 
-    If `log` is None, the iterator is empty.
+    The listener is a function that writes an event of the server to the log file.
+
+    Args:
+        log: path of the log file, or None if the option is not given.
+        stack: exit stack that closes the file.
     """
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())

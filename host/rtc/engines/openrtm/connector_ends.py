@@ -117,7 +117,7 @@ class ConnectorPlace:
     Attributes:
         orb: ORB of this process.
         calls: queue that runs calls in the manager's thread, also between two ticks.
-        threads: threads that call other processes, for all data ports.
+        threads: threads that call other processes. All data ports share these threads.
         post: function that schedules a call in the manager's thread. The call waits until just
             before the next tick.
         connector_id: ID of the connector.

@@ -154,14 +154,14 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Prepare the end of a connector, because the other process or a tool has requested it.
+        """Find a connector that the other process or a tool wants to end.
 
-        The other process will not be notified when the connector ends.
+        After this call, `end` does not notify the other process.
 
         Returns:
-            The first value is the object for a connector to another process, or None if no such
-            connector has this ID. The second value is False if the ID is unknown. An ID is known if
-            a connector of the port has it, or if a connector with this ID has just ended.
+            Two values. The first value is the object for a connector to another process, or None if
+            no such connector has this ID. The second value is False if the ID is unknown. An ID is
+            known if a connector of the port has it, or if a connector with this ID has just ended.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True

@@ -57,9 +57,9 @@ class Stamps:
         return divmod(self._start_ns + 1_000 * tm_us, 1_000_000_000)
 
     def to_system(self, sec: int = 0, nanosec: int = 0) -> Time:
-        """Convert the time stamp of a ROS message to a time of the system.
+        """Convert the time stamp of a ROS message to the time since the start of the RTC system.
 
-        Without a stamp, the result is the present time.
+        Without a stamp, the result is the present time of the system.
         """
         now_us = self._now_us()
         at_us = (sec * 1_000_000_000 + nanosec - self._start_ns) // 1_000
