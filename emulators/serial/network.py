@@ -225,8 +225,8 @@ class HostConnection:
     def hold(self, now_us: int) -> None:
         """Keep data of a host that waits because another host uses the line.
 
-        A host of RFC 2217 gives up without negotiation. Therefore this method also negotiates with
-        such a waiting host.
+        A host of RFC 2217 starts with a negotiation, and gives up if it gets no answers. Therefore
+        this method answers the negotiation of a waiting host.
 
         Only the first part of the waiting host's data is read and kept.
         """
@@ -517,11 +517,11 @@ class NetworkPort(NonCopyable):
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set the port like the device, and report each host that requests another setting.
+        """Set the port to the device's setting, and report each host that requests another setting.
 
         Args:
-            baud: bit rate of the device in bit/s, with 8N1. Rates above 4 Mbit/s, the highest rate
-                of adapters, are not checked: such a device is on USB, and its host may use any
+            baud: bit rate of the device in bit/s, with 8N1. If the rate is above 4 Mbit/s, no host
+                is reported: such a fast device is connected by USB, so a host may request any
                 setting.
             notify: function that is called with each setting that differs, such as `9600 8N1`.
         """

@@ -254,9 +254,9 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """From now on, compare the setting of each host with a new setting of the device.
+        """Note a new setting of the device, and report each host that has another setting.
 
-        The bytes are not changed, because a pty transmits without a bit rate.
+        A host with another setting still gets the correct bytes, because a pty has no bit rate.
 
         Args:
             setting: new setting of the device. A pty does not show the data bits that a host has

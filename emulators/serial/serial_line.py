@@ -151,7 +151,7 @@ class LineEnd(Part):
 
     @property
     def sent_us(self) -> int:
-        """Time at which the last byte of this end will have been sent.
+        """Time at which all bytes that were queued here with `send` will have been sent.
 
         If all bytes have been sent, the result is a time in the past or `NEVER`, with the same
         meaning.

@@ -479,13 +479,13 @@ class HostWaits(Copyable):
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
     def give_up(self, timeout_s: float | None) -> None:
-        """Raise SerialException after a wait of one hour without a timeout.
+        """Raise SerialException if a wait without a timeout has lasted one hour.
 
-        The caller has waited until `deadline_us`. Without this exception, the host would wait
-        forever. After a wait with a timeout this method does nothing.
+        Call this method at the time that `deadline_us` has returned. If the wait has a timeout,
+        this method does nothing.
 
         Args:
-            timeout_s: expired timeout in seconds, or None if there was no timeout.
+            timeout_s: timeout in seconds, as for `deadline_us`, or None if there is no timeout.
         """
         if timeout_s is None:
             raise SerialException("nothing came for an hour, and no timeout was given")

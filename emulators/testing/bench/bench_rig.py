@@ -98,8 +98,8 @@ class Journal(WireLog):
             source: name of the line or node.
             ends: names of the two sides of the wire, such as `host` and `device`, for the text of
                 an entry. The second name is that of the device or node.
-            splitter: splitter of the line into entries of the journal. The bytes of a line without
-                a delimiter are shown in hex.
+            splitter: object that splits the bytes of a serial line into entries of the journal. If
+                the format of the entries has no delimiter, the bytes are shown in hex.
         """
         is_binary = isinstance(splitter, FrameFormat) and not splitter.delimiter
 
@@ -263,8 +263,8 @@ class Parts:
             as a device, with the name `body`.
         start: initial values of inputs, by device and name.
         signals: values that change with time. The key `DEVICE/INPUT` is an input, whose value the
-            signal sets. Any other key is a name, under which other signals use the value in their
-            formulas.
+            signal sets. A value with any other key sets no input. The formulas of other signals can
+            use this key like a variable.
         stores: files for the parameters that nodes store. A file is written when a node stores
             something.
         seed: seed of all random numbers.
@@ -591,7 +591,7 @@ class BenchRig(RunningEmulator):
         return any(each is order for each in self.orders)
 
     def cancel(self, fault: str) -> None:
-        """Forget the requests of a fault that wait for a condition.
+        """Cancel a requested fault whose start condition has not become true yet.
 
         Args:
             fault: full name of the fault.

@@ -120,7 +120,8 @@ class BusMount(Copyable):
     Attributes:
         wire: the bus.
         nodes: nodes by name.
-        node_faults: objects on which faults of a node are armed, by name of the node.
+        node_faults: for each node the object that starts the faults of the node, by name of the
+            node.
         entries: description of each node for the header of a trace, by name of the node.
     """
 

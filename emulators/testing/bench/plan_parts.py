@@ -257,7 +257,8 @@ def mounts_of(
     Each serial device gets its own line. All CANopen nodes are on one CAN bus.
 
     Args:
-        devices: devices, device types or names of device types, by name of the device.
+        devices: the keys are the names of the devices. Each value is a device, a device type, or
+            the name of a device type.
         seed: seed of all random numbers.
         line: parameters of the serial lines. The default is the parameters of the device type, or
             115200 8N1.

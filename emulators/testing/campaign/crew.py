@@ -189,8 +189,8 @@ class Crew:
 
         Args:
             runs: runs of collected tests.
-            digest: hash of the files of the tests, as the campaign has it. The runs are refused if
-                the files on this machine have another hash.
+            digest: hash of the test files on the machine that started the campaign. The runs are
+                refused if the test files on this machine have another hash.
 
         Raises:
             Refusal: the files of the tests are different on this machine.

@@ -103,7 +103,8 @@ class RunVerdict(NamedTuple):
     Attributes:
         number: number of the run in the campaign.
         outcome: `passed`, `failed`, `error`, `blocked`, `skipped`, `hung` or `died`. The outcome is
-            `hung` if the run took too long, and `died` if its process ended three times.
+            `hung` if the run took too long. If the worker process ends during the run, the run is
+            repeated. If this happens three times, the outcome is `died`.
         virtual_us: virtual time on the bench at the end of the run, in microseconds.
         where: file and line of the failure, or empty if the run passed or the line is unknown.
         reason: reason of the outcome in one line, or empty if the run passed.

@@ -187,7 +187,7 @@ class RunPlots:
         inputs: files that the run reads, which must not be overwritten.
 
     Raises:
-        Refused: a file cannot be written after the run.
+        Refused: one of `files` cannot be written. This is checked before the run.
     """
 
     def __init__(
@@ -388,7 +388,7 @@ class RunPage:
         inputs: files that the run reads, which must not be overwritten.
 
     Raises:
-        Refused: the page cannot be written after the run.
+        Refused: the page cannot be written. This is checked before the run.
     """
 
     path: Path

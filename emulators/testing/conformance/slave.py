@@ -120,7 +120,8 @@ class CalledSlave:
 def is_step(node: object) -> bool:
     """Return whether an object can be called with a time and frames, but not without arguments.
 
-    `CalledSlave` refuses such an object as `make`, because `make` is called without arguments.
+    Such an object cannot be the argument `make` of `CalledSlave`, because `CalledSlave` calls
+    `make` without arguments.
     """
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 

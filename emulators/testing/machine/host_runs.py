@@ -126,8 +126,8 @@ def parse_steps(
     Args:
         text: content of the scenario file.
         file: name of the file, for error messages.
-        rules: arguments of the methods that a `BenchMachine` marks by `host_rule`, by name of the
-            method. If an argument has a list of possible values, a step may use each of these
+        rules: the methods of a `BenchMachine` with the decorator `host_rule`. Each key is the name
+            of a method. Each value contains the arguments of the method, with their possible
             values.
 
     Raises:
@@ -354,7 +354,7 @@ class HostRuns:
 
         Raises:
             HostHangsError: the host waits without end.
-            Exception: the exception of the machine or of the host.
+            Exception: any other exception that the `BenchMachine` or the host has raised.
         """
         # All runs begin at one snapshot with the same objects, so hosts that hold a device need no
         # update.

@@ -232,7 +232,7 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the arguments of all markers `needs` of a test, in their order.
+    """Return the arguments of a test's pytest markers with the name `needs`, in their order.
 
     Raises:
         ValueError: a name is unknown.

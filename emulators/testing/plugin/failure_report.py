@@ -32,7 +32,7 @@ _MOST: Final = 80
 
 
 def stem_of(nodeid: str) -> str:
-    """Return the base name of a test's files, made from its node ID; it is unique to the test.
+    """Return a unique base name for the files of a test, made from the test's node ID in pytest.
 
     >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
     'tests_test_stop.py_test_it_stops_fast-24cfca'

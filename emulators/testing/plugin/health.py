@@ -35,9 +35,9 @@ LOST: Final = "lost"
 class Health:
     """Records errors and lost data on the wires of a bench, for the verdict of a test.
 
-    Errors and lost data on a wire are not reported if a fault of this wire, or of any device,
-    occurred before. Lost data on a serial line are not reported either if no host has sent data on
-    this line, because then no host reads the line.
+    Errors and lost data on a wire are not reported after a fault was injected on this wire or in
+    any device, because the fault may be their cause. Lost data on a serial line are also not
+    reported if no host has sent data on this line, because then no host reads the line.
 
     Args:
         bench: bench of the test. For real devices only error frames are known.
@@ -148,13 +148,14 @@ SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
 def with_plan(
     safe: SafeState, plan: Mapping[str, Mapping[str, Setting]], bench: Bench
 ) -> SafeState:
-    """Return the values that outputs must have after a test, from a fixture and the rig file.
+    """Return the requirements on outputs after a test: those of a fixture and of the rig file.
 
-    If both give a value for an output, the value of the fixture is used.
+    If the fixture and the rig file require a value of the same output, the value of the fixture is
+    used. If the fixture gives a function, the result is a function that checks both requirements.
 
     Args:
-        safe: value of the fixture `bench_safe`: required values by the names of outputs, a function
-            that checks the bench, or None without requirements.
+        safe: value of the fixture `bench_safe`. It has the required values by the names of outputs,
+            or is a function that checks the bench. None means no requirements.
         plan: required values of the rig file, by device and output.
         bench: the bench.
     """
@@ -308,9 +309,10 @@ LONG_WAITS: Final = "long waits"
 def guard(
     mode: str, allowed: Container[str], others: Collection[Thread]
 ) -> AbstractContextManager[None]:
-    """Return a context manager that fails a test in virtual time if it uses the machine's clock.
+    """Return a context manager in which a use of the machine's clock makes a test fail.
 
-    In other modes, or if the test may use this clock, the context manager does nothing.
+    If the bench is not in virtual time, or if the test may use the machine's clock, the context
+    manager does nothing.
 
     Args:
         mode: mode of the bench.

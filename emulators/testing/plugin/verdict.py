@@ -47,13 +47,13 @@ def blocked(
     *,
     mistaken: bool = False,
 ) -> str:
-    """Return the reason if a phase of a test gave no verdict about the device, otherwise "".
+    """Return why the bench could not judge the device in a phase of a test, or "" if it could.
 
-    For example, there is no verdict if the machine was too slow.
+    One possible reason is that the machine was too slow.
 
     Args:
-        report: report of the phase.
-        call: result of the phase.
+        report: pytest's report of the phase, with the outcome.
+        call: pytest's `CallInfo` of the phase, with the exception that the phase raised.
         bench: bench of the test, or None if the bench was not opened.
         mistaken: whether the test itself is wrong; see `is_mistake`.
     """
@@ -68,9 +68,9 @@ def blocked(
 def is_mistake(error: BaseException) -> bool:
     """Return whether an error is a mistake in the test, so that a faster machine would not help.
 
-    Examples are a misspelt name, and a call that the bench refuses. An error because a value is
-    None is no mistake: on a slow machine, a message may not have arrived in time. An exception that
-    the host itself raises is no mistake either.
+    Examples are a misspelt name, and a call that the bench refuses. The result is false for an
+    error that arises because a value is None: on a slow machine, the message with the value may
+    have arrived too late. The result is also false for an exception that the host itself raises.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))

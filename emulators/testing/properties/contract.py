@@ -32,7 +32,8 @@ def check_members(device: Any, nothing: Any) -> None:
 
     Args:
         device: the device, which is not changed.
-        nothing: empty traffic of the type that the device uses: bytes or frames.
+        nothing: what the device receives in a tick without traffic: empty bytes, or an empty tuple
+            of frames.
 
     Raises:
         AssertionError: an attribute is missing, or the period is invalid.
@@ -58,12 +59,15 @@ def _check_due(device: Any) -> None:
 
 
 def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
-    """Execute actions on a device without a wire, and check the types of all returned values.
+    """Execute actions on a device, and check the types of all values that the device returns.
+
+    The ticks of the device are called directly, without a rig and without a wire.
 
     Args:
         device: a new device.
         acts: actions of host and environment.
-        nothing: empty traffic of the type that the device uses: bytes or frames.
+        nothing: what the device receives in a tick without traffic: empty bytes, or an empty tuple
+            of frames.
 
     Raises:
         AssertionError: a value has a wrong type, or a tick has not cleared `inputs.changed`.

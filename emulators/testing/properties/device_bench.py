@@ -173,7 +173,7 @@ def difference(
     """Return a description of the first difference between two runs of a device, or "" if equal.
 
     Args:
-        device: the device with the outputs.
+        device: the device that was run. Only the names of its outputs are read.
         one: observations of one run.
         other: observations of the other run.
         first: name of the run `one` in the description, such as `dense`.

@@ -115,7 +115,7 @@ def sessions(
     A session has actions of a host and of the environment, one after the other.
 
     Args:
-        device: a device of the type for which the sessions are. This device is not changed.
+        device: device for which the sessions are made. The device is not changed.
         traffic: strategy for the traffic that a host sends at once; see `chunks` and `frames`.
         most: largest number of actions.
     """

@@ -80,10 +80,12 @@ class RunEnvironment:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A requirement on the device or host, which tests name to show that it is met.
+    """A requirement on the device or host.
+
+    A test of the requirement has the marker `req` with the name of the requirement.
 
     Attributes:
-        name: name of the requirement, as in the marker `req`, such as `SAF-12`.
+        name: name of the requirement, such as `SAF-12`.
         text: the requirement as readable text.
     """
 

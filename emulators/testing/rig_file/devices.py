@@ -190,7 +190,7 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits | None:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return whether a device's key `type` names a built-in type, an EDS, a model or Python code.
+    """Return what a device's key `type` names: a device type, an EDS, a model or Python code.
 
     Args:
         text: type as in the rig file.
@@ -199,8 +199,8 @@ def kind_of(
             built in.
 
     Returns:
-        The kind of source, and the text of `type`. If the text is a file name, the folder is put in
-        front, so that the file can be opened.
+        A pair: the kind of what is named, and the text of `type`. If the text is a file name, the
+        folder is put in front, so that the file can be opened.
 
     Raises:
         ValueError: no such type or file exists.

@@ -223,8 +223,8 @@ def open_stimulus(text: str) -> Stimulus:
     Args:
         text: value of the option `--stimulus`. For `ask`, the user is asked to operate the inputs.
             For `control:PATH` or the path of a control socket, the emulator that serves this socket
-            operates them. For any other text, which is a command with its arguments, the command
-            operates them.
+            operates them. Any other text is a command line. This command is executed to operate the
+            inputs.
 
     Raises:
         Refused: the text is not a command line, or `ask` is used without a terminal.

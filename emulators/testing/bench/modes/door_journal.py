@@ -35,8 +35,8 @@ class PortRecord:
 
     Args:
         plan: content of the rig file.
-        mounts: emulated wires that correspond to the real wires. The header of the trace describes
-            the real wires with their names, devices and settings.
+        mounts: for each real wire an emulated wire with the same devices and settings, by name of
+            the wire. The header of the trace is made from these emulated wires.
         now_us: function that returns the time in microseconds.
     """
 
@@ -174,14 +174,14 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Mark frames as recorded by a connection, so that no other connection records them.
+        """Mark frames as already recorded, so that no other connection records them again.
 
         Args:
             wire: name of the bus.
-            watch: monitor of the connection that has recorded the frames.
+            watch: monitor of the connection that records the frames.
             frames: the recorded frames.
-            by: value 1 to add the mark, or value -1 to remove the mark because the frames could not
-                be sent.
+            by: the value 1 marks the frames. The value -1 undoes this, if the frames could not be
+                sent.
         """
         with self._lock:
             self._announce(wire, watch, frames, by)

@@ -138,7 +138,7 @@ class WatchedLink(Generic[W]):
 class WatchedFrameLink(WatchedLink[Frames]):
     """Wrapper of a host's `StampedLink` to a CAN bus, for a monitor of the host.
 
-    The monitor gets the frames that pass and the durations of the host's waits.
+    The monitor gets the frames of the host and the durations of the host's waits.
 
     Args:
         link: the wrapped link.

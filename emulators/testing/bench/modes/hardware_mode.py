@@ -132,7 +132,7 @@ class HardwareMode(BenchMode):
             self._look()
 
     def clear(self, owner: str, fault: str) -> None:
-        """Clear a fault by the operator, or cancel a fault that waits for its condition."""
+        """Let the operator clear a fault. If the fault waits for its condition, cancel it, too."""
         self._rig.cancel(self._rig.state.full_fault_name(owner, fault))
         self._pending = [entry for entry in self._pending if self._rig.is_ordered(entry[2])]
         self._operators.clear(owner, fault)

@@ -78,11 +78,11 @@ class BenchMode(ABC):
         rig: rig with the emulated devices. If the devices of the bench are real, the rig has an
             equivalent device for each of them. Such a rig only provides information, such as names
             and wires; its time does not advance.
-        tolerance: permitted deviations of operators and real devices.
+        tolerance: permitted deviations from the expected times and values in a test.
 
     Attributes:
         name: name of the mode: `virtual`, `real` or `hardware`.
-        tolerance: permitted deviations of operators and real devices.
+        tolerance: permitted deviations from the expected times and values in a test.
         doors: connections for hosts. The first connection starts the time.
     """
 

@@ -353,7 +353,7 @@ class _EmulatorOperator:
         the device stays as it is, for example the position of a drive.
 
         Args:
-            like: equivalent emulated device, which has the initial values.
+            like: emulated device of the same type, from which the initial values are read.
         """
         for name in self._wire_faults:
             self._request("clear", name=name)
@@ -489,10 +489,10 @@ _DeviceOperator = _HumanOperator | _EmulatorOperator
 
 
 class Operators:
-    """Sets inputs, reads outputs and starts faults of the devices of a bench of real devices.
+    """Sets inputs, reads outputs and starts faults of real devices.
 
-    A human does this at each real device. If an emulator in another process stands in for a real
-    device, it gets the requests through its control socket.
+    A human at the terminal is asked to do this by hand. If an emulator in another process stands in
+    for a real device, the requests are instead sent to the control socket of the emulator.
 
     Args:
         plan: content of the rig file.

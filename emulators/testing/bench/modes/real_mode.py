@@ -279,7 +279,7 @@ class RealMode(EmulatedMode):
     def open(
         cls, mounts: Sequence[Mount], plan: RealPlan, rig_at: Callable[[OutsideEnds], BenchRig]
     ) -> Self:
-        """Open the connections for hosts, and return the mode of the bench in real time.
+        """Open the connections for hosts, and return a `RealMode` with these connections.
 
         Args:
             mounts: the wires with their devices.

@@ -372,9 +372,7 @@ class VirtualMode(EmulatedMode):
         """Advance the virtual time until a condition is true; return False after the time-out.
 
         Without a time-out, the wait ends when there are no more events, or after a day. The
-        condition is checked after each step. In long steps the condition is also checked
-        periodically. The reason is that the condition may call a host, and the host may have work
-        to do.
+        condition is checked after each step, and periodically during long steps.
         """
         found = self._wait_until(done, within_us)
         self._limit.restart(self._rig.rig.now_us)

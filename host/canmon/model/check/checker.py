@@ -114,7 +114,8 @@ class RuleCheck:
 
         Args:
             channel: name of the bus.
-            window: the second, and the number of bits that were sent on the bus in it.
+            window: start of a period of one second, and the number of bits on the bus in this
+                period.
         """
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
@@ -258,9 +259,9 @@ class Checker(RuleCheck):
             end_us: time in microseconds at which listening ended.
             lost: messages of the source about lost frames, and about lines of a log that are not
                 frames.
-            judged_us: end of the check of rules that are expressions, such as `181 every 10ms`, in
-                microseconds. None means `end_us`. For a source without a clock, such as standard
-                input, give the time of the latest frame.
+            judged_us: time in microseconds up to which the rules written as expressions, such as
+                `181 every 10ms`, are checked. None means `end_us`. For a source without a clock,
+                such as standard input, give the time of the latest frame.
             errors: messages of the source about bus errors that it did not report as error frames.
         """
         found = self._ended(self._loads, end_us, lost, errors)
@@ -272,11 +273,12 @@ class Checker(RuleCheck):
         return self._ended({}, now_us) + self._written_ended(now_us)
 
     def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
-        """Return the rules that have judged nothing by the end of the traffic, with the reasons.
+        """Return the rules that found nothing to check in the traffic, each with the reason.
 
         Args:
             end_us: time in microseconds at which listening ended.
-            without_errors: reason why the source cannot contain error frames, empty if it can.
+            without_errors: reason why the source cannot contain error frames. If the source can
+                contain error frames, the text is empty.
         """
         return self._unjudged(end_us, without_errors, self._expressions)
 

@@ -109,7 +109,7 @@ class Rhythm(NamedTuple):
 
 
 def rhythm_of(times: Sequence[int]) -> Rhythm | None:
-    """Return the rhythm of the frames of one CAN-ID, or None if they are not periodic.
+    """Return the period of a CAN-ID's frames and the deviations from it, or None without a period.
 
     Args:
         times: times of the frames in microseconds, in order.

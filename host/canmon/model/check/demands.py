@@ -480,10 +480,11 @@ class Toggle(RuleDemand):
 
     The toggle bit must be 0 in the first answer after a boot-up.
 
-    If the log contains requests, a frame is an answer if it follows a request. Without requests,
-    only the toggle bit distinguishes an answer from a heartbeat. Then the first frame whose toggle
-    bit is set is an answer, and so are all later frames. A node that produces heartbeats is not
-    judged, because it does not answer guarding requests.
+    If the log contains requests, the first frame after a request is the answer. If the log contains
+    no requests, only the toggle bit shows that a frame is an answer, because the toggle bit of a
+    heartbeat is always 0. Therefore the first frame with a set toggle bit and all later frames are
+    judged as answers. A node that produces heartbeats is not judged, because it does not answer
+    guarding requests.
 
     Args:
         event: event that selects the nodes to judge. A node stays selected after its first matching
@@ -894,8 +895,8 @@ class Steps(Follow):
 
     Args:
         event: event of the rule. If it is only the name of a signal, the values of this signal are
-            used. Otherwise it is a filter of frames, and the value of the first signal in each
-            frame that passes is used.
+            used. Otherwise the event selects frames. In each selected frame, the value of the first
+            signal is used.
         most: largest allowed change of the value.
     """
 
@@ -919,8 +920,8 @@ class Changes(RuleDemand):
 
     Args:
         event: event of the rule. If it is only the name of a signal, the values of this signal are
-            used. Otherwise it is a filter of frames, and the value of the first signal in each
-            frame that passes is used.
+            used. Otherwise the event selects frames. In each selected frame, the value of the first
+            signal is used.
         most_us: longest allowed time without a change, in microseconds.
     """
 

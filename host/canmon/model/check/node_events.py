@@ -83,10 +83,11 @@ class BeatEvent(NamedTuple):
 
     Attributes:
         at_us: time of the event in microseconds.
-        row: row of the event.
+        row: index of the event's frame in `BusFrames`.
         kind: `order` is an NMT reset or a write to 1017h, `excuse` is a boot-up after an NMT reset,
-            and `boot` is a boot-up without an NMT reset. If heartbeats are missing before the
-            event, this is a fault for `order` and `boot`, but not for `excuse`.
+            and `boot` is a boot-up without an NMT reset. If heartbeats are missing before `order`
+            or `boot`, this is a fault. If they are missing before `excuse`, this is no fault,
+            because the node was reset.
     """
 
     at_us: int

@@ -392,9 +392,8 @@ class Heartbeat(Rule):
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Return the reason why nothing was judged, if there was no gap to compare.
 
-        A gap is the time between two successive heartbeats. If there was a gap, the result is an
-        empty text. The time from a boot-up to the next heartbeat is no such gap. The time from the
-        last heartbeat to a boot-up is one only if no NMT command has reset the node.
+        If there was a gap, the result is an empty text. A gap is the time between two successive
+        heartbeats, or from a heartbeat to a boot-up without an NMT reset.
         """
         if evidence.untimed:
             return ONE_TIME

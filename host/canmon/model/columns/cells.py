@@ -302,9 +302,10 @@ class Scale(NamedTuple):
 def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Mask]:
     """Return the physical values of many integers as texts.
 
-    The text of a value is right if it is equal to the text that `str` gives for the value as a
-    float. This function calculates with integers, so a text may be wrong. The returned mask is True
-    for each row whose text is surely right. For all other rows, the caller must use `str`.
+    A correct text is the text that `str` returns for the value as a float. For some values, such as
+    very large and very small ones, the text of this function may differ from it. The returned mask
+    has an element for each integer. It is True if the text is certainly correct. If it is False,
+    the caller must use the text of `str` instead.
 
     Args:
         numbers: integers from the frames.
@@ -312,7 +313,7 @@ def scaled(numbers: npt.NDArray[np.int64], scale: Scale) -> tuple[list[Part], Ma
 
     Returns:
         The parts of the texts, and the mask. The parts are sign, digits before the decimal point,
-        point, and decimals. The caller joins them row by row.
+        point, and decimals. For each integer, the caller joins its parts.
     """
     factor, offset, tens, times, more = scale
     limit = (_EXACT - abs(more)) // abs(times)
