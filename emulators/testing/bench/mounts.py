@@ -120,7 +120,7 @@ class BusMount(Copyable):
     Attributes:
         wire: the bus.
         nodes: nodes by name.
-        node_faults: for each node the object that starts the faults of the node, by name of the
+        node_faults: objects that start faults. There is one object for each node, by name of the
             node.
         entries: description of each node for the header of a trace, by name of the node.
     """

@@ -32,8 +32,8 @@ def check_members(device: Any, nothing: Any) -> None:
 
     Args:
         device: the device, which is not changed.
-        nothing: what the device receives in a tick without traffic: empty bytes, or an empty tuple
-            of frames.
+        nothing: value that the device receives in a tick without traffic: empty bytes, or an empty
+            tuple of frames.
 
     Raises:
         AssertionError: an attribute is missing, or the period is invalid.
@@ -66,8 +66,8 @@ def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
     Args:
         device: a new device.
         acts: actions of host and environment.
-        nothing: what the device receives in a tick without traffic: empty bytes, or an empty tuple
-            of frames.
+        nothing: value that the device receives in a tick without traffic: empty bytes, or an empty
+            tuple of frames.
 
     Raises:
         AssertionError: a value has a wrong type, or a tick has not cleared `inputs.changed`.

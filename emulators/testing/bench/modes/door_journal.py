@@ -35,8 +35,8 @@ class PortRecord:
 
     Args:
         plan: content of the rig file.
-        mounts: for each real wire an emulated wire with the same devices and settings, by name of
-            the wire. The header of the trace is made from these emulated wires.
+        mounts: emulated wires with the same devices and settings as the real wires, by name of the
+            wire. The header of the trace is made from these emulated wires.
         now_us: function that returns the time in microseconds.
     """
 
