@@ -109,7 +109,7 @@ class Gearbox:
                 mode.
             stick: translation and rotation of the stick itself. They determine the gear.
             shaped: translation and rotation of the stick after the function `shape`.
-            knobs: parameters of the command `joystick`. This method uses three of them: the neutral
+            knobs: parameters of the command `joystick`. This method uses #8 to #10: the neutral
                 radius `neutral_pct`, and the angles `switch_deg` and `fade_deg`.
         """
         v_pct, w_pct = shaped

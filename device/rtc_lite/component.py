@@ -129,8 +129,9 @@ class LiteComponent(DeviceComponent):
 
     Raises:
         ValueError: the type name is invalid, there are more than 8 in-ports or more than 8
-            out-ports, or two ports have the same name. The error is also raised if a physical input
-            accepts fractions, because these components support only integers as inputs.
+            out-ports, or two in-ports or two out-ports have the same name. The error is also raised
+            if a physical input accepts fractions, because these components support only integers as
+            inputs.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):

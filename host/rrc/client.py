@@ -385,8 +385,8 @@ class RrcClient(Closing):
         The RRC manual advises the slowest speed mode whenever the driver changes. The slowest speed
         mode stays selected. If you want another speed mode, select it after this call.
 
-        This method sends the command `output`. If the stick was driving, the method waits until the
-        RRC has confirmed this command.
+        This method sends the command `output`. If the stick was driving, or if it is unknown who
+        was driving, the method waits until the RRC has confirmed this command.
 
         Args:
             v_pct: translation in -100..100 %, forward positive.

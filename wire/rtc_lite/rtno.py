@@ -192,9 +192,11 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 class RtnoReplies(RtnoPacketDecoder):
     r"""Converts RTno packets of a device to RTC-Lite frames, for use at a proxy on a PC.
 
-    It is used like `LiteDecoder(REPLIES)`. RTno packets lack some parts of the RTC-Lite frames,
-    such as the number of ports. This decoder adds the missing parts if it can compute them from the
-    other parts. The component's state after a refused command is unknown, so it is written as `?`.
+    It is used like `LiteDecoder(REPLIES)`. RTno packets lack some parts of the RTC-Lite frames: the
+    status in a reply with a state, the state in a reply to a command, and the numbers of ports and
+    the type in the profile of a component. This decoder adds the missing parts if it can compute
+    them from the other parts. The component's state after a refused command is unknown, so it is
+    written as `?`.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]

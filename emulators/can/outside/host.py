@@ -107,6 +107,8 @@ class CanHost:
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
         """Send frames periodically: one frame now and one in each period, in turn.
 
+        The frames are sent whenever any code advances the rig's time.
+
         Args:
             frames: frames to send. After the last one, the first one is sent again.
             period_us: time between two frames on the clock of the rig.

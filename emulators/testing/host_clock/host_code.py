@@ -146,7 +146,8 @@ class Patch:
     Attributes:
         original: the original function.
         act: function that is called instead if the caller is a host.
-        on: whether the replacement is active. If it is not, all callers get the original function.
+        on: whether the replacement is active. If it is not, all callers get the original function,
+            also code that still has a reference to this object.
     """
 
     def __init__(self, original: Callable[..., Any], act: _Act) -> None:

@@ -111,8 +111,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 def last_lines(bench: Bench, count: int) -> str:
     """Return the last events on a bench as lines of text with time, wire, direction and content.
 
-    A line of text that a serial line has not transmitted completely yet comes after all other
-    events.
+    A line or frame on a serial line that has not ended yet comes after all other events.
     """
     described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]

@@ -372,7 +372,8 @@ class VirtualMode(EmulatedMode):
         """Advance the virtual time until a condition is true; return False after the time-out.
 
         Without a time-out, the wait ends when there are no more events, or after a day. The
-        condition is checked after each step, and periodically during long steps.
+        condition is checked after each step, and periodically during long steps. The reason for the
+        periodic check is that the condition may call a host that has work to do.
         """
         found = self._wait_until(done, within_us)
         self._limit.restart(self._rig.rig.now_us)

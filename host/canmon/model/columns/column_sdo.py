@@ -294,8 +294,8 @@ class ColumnSdo:
     ) -> None:
         """Write the meanings of the SDO frames of one bus into the texts of a block of frames.
 
-        The caller must not pass frames that change the meaning of a CAN-ID or an object, such as a
-        frame that writes a PDO mapping.
+        The caller must not pass frames that may change what is known about a node, such as a frame
+        that writes a PDO mapping.
 
         Args:
             frames: frames of the bus in the block.

@@ -114,7 +114,8 @@ async def home(
         mode: homing mode of the drive.
         within_us: longest duration of homing, in microseconds.
         caught_up: function that returns an operation to await. The drive receives the latest
-            controlword, and then sends a statusword. This statusword ends the operation.
+            controlword, and then sends a statusword. This statusword ends the operation. So it does
+            not show the state before the controlword.
 
     Raises:
         DriveFailed: homing does not start, does not end in time, or ends with an error.
