@@ -58,7 +58,7 @@ class CanEmulator(RunningEmulator):
         self._ends = [station.port for station in stations]
         self._host = self._open_end()
         beyond = self._open_end(None if outside else frozenset())
-        bridges = [CanBridge(beyond, outside, link or "CAN bus")] if outside else []
+        bridges = [CanBridge(beyond, outside)] if outside else []
         self.rig = Rig(
             *stations,
             bridges=bridges,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import ClassVar, Final, Protocol
 
-from tickrig.device.canopen.slave import TICK_US, UNCONFIGURED, Application, CanopenSlave
+from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
 from tickrig.device.horizon import Horizon
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.twin import Copyable
@@ -19,6 +19,7 @@ from tickrig.host.text.log import log_of
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.can import CanFrame, ErrorState, Frames
+from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
@@ -402,7 +403,10 @@ class _Table(Mapping[str, InputSignal]):
 
 # Detection of duplicate nodes on a bus outside.
 
-_ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + UNCONFIGURED)
+_NODE_ID: Final = 0x7F
+_BASES: Final = (0x080, sdo_frame.RESPONSE_COB_ID, ERROR_CONTROL_COB_ID)
+_OF_NODES: Final = frozenset(base + node for base in _BASES for node in range(1, _NODE_ID + 1))
+"""CAN-IDs of EMCYs, SDO answers and error control, each of which only one node sends."""
 
 _logger = log_of(__name__)
 
@@ -410,9 +414,9 @@ _logger = log_of(__name__)
 class SecondNodeAlarm(PortBefore):
     """A port that warns if another node on the real bus has the node-ID of an emulated node.
 
-    There is one warning for each node. The port checks boot-ups, heartbeats and answers to
-    guarding. A second node that sends no such frame is not detected. A second node is also not
-    detected while the emulated node has no power.
+    There is one warning for each node. The port checks boot-ups, heartbeats, answers to guarding,
+    EMCYs and SDO answers. A second node that sends no such frame is not detected. A second node is
+    also not detected while the emulated node has no power.
 
     Args:
         port: the port on the bus.
@@ -427,14 +431,14 @@ class SecondNodeAlarm(PortBefore):
         """Read the frames that other nodes have sent."""
         frames = super().poll(now_us)
         for frame in frames:
-            if frame.can_id in _ERROR_CONTROL and self._alone:
+            if frame.can_id in _OF_NODES and self._alone:
                 self._look(frame)
         return frames
 
     def _look(self, frame: CanFrame) -> None:
         if frame.extended or not frame.data:
             return
-        node_id = frame.can_id - ERROR_CONTROL_COB_ID
+        node_id = frame.can_id & _NODE_ID
         for node in self._alone:
             if node.slave.node_id == node_id and node.is_on:
                 self._alone.remove(node)

@@ -7,16 +7,11 @@ from typing import Final, Protocol
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.port import Port
 from tickrig.host.links.echo import EchoFilter
-from tickrig.host.text.log import log_of
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
-_logger = log_of(__name__)
-
 _HANDOVER_US: Final = 1_000
 """Longest period between two deliveries of received frames."""
-_OF_NODES: Final = frozenset((*range(0x081, 0x100), *range(0x581, 0x600), *range(0x701, 0x780)))
-"""CAN-IDs of EMCYs, SDO answers and heartbeats, each of which only one CANopen node sends."""
 
 
 class CanBridge:
@@ -26,20 +21,14 @@ class CanBridge:
     to the real bus. Frames from the real bus are sent on the emulated wire as if an additional node
     sent them. So each of these frames also occupies the emulated wire for the length of the frame.
 
-    If a program on the real bus sends frames of a node that is also in the rig, one warning is
-    logged. The usual cause is a second emulator of the same node.
-
     Args:
         end: connection to the emulated bus, made by `CanWire.end`. No node uses this connection.
         outside: port of the bus outside.
-        name: name of the real bus in messages.
     """
 
-    def __init__(self, end: CanEnd, outside: Port[Frames], name: str = "CAN bus") -> None:
-        self._end, self._outside, self._name = end, outside, name
+    def __init__(self, end: CanEnd, outside: Port[Frames]) -> None:
+        self._end, self._outside = end, outside
         self._looked_us = 0
-        self._own = set[int]()
-        self._doubled = False
 
     @property
     def due_us(self) -> int:
@@ -56,29 +45,12 @@ class CanBridge:
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)
-            if not self._doubled:
-                self._find_doubled(frames)
         self._looked_us = now_us
 
     def give_out(self, now_us: int, /) -> None:
         """Deliver the frames that have arrived by now to the outside."""
         if frames := self._end.poll(now_us):
             self._outside.send(now_us, frames)
-            self._own |= _of_nodes(frames)
-
-    def _find_doubled(self, frames: Frames) -> None:
-        """Log a warning if frames from the real bus have a CAN-ID of a node in the rig."""
-        for can_id in sorted(self._own & _of_nodes(frames)):
-            self._doubled = True
-            text = "%s: another program also sends %03Xh: is node %d emulated twice on this bus?"
-            _logger.warning(text, self._name, can_id, can_id & 0x7F)
-            return
-
-
-def _of_nodes(frames: Frames) -> set[int]:
-    """Return the CAN-IDs in frames that only one node sends."""
-    plain = (frame for frame in frames if not frame.remote and not frame.extended)
-    return {frame.can_id for frame in plain if frame.can_id in _OF_NODES}
 
 
 class CountingPort(Port[Frames], Protocol):

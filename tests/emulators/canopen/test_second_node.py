@@ -56,6 +56,15 @@ def test_a_second_node_of_a_node_id_is_told_once(
     assert len(said(caplog)) == 2
 
 
+@pytest.mark.parametrize("frame", ["585#6040600000000000", "085#0000000000000000"])
+def test_an_answer_or_an_emcy_of_a_second_node_is_told(
+    emulator: CanEmulator, other: can.BusABC, caplog: pytest.LogCaptureFixture, frame: str
+) -> None:
+    hear(emulator, other, f"{frame} 080# 587#6040600000000000")
+    text = f"node-ID 5 is on the bus twice: another node sent {frame}; stop one of the two"
+    assert said(caplog) == [text]
+
+
 def test_the_master_guarding_and_other_nodes_are_none(
     emulator: CanEmulator, other: can.BusABC, caplog: pytest.LogCaptureFixture
 ) -> None:

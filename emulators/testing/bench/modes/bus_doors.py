@@ -14,11 +14,12 @@ from typing import Any
 
 import can
 
-from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge
 from tickrig.emulators.can.outside.bus_port import port_on
+from tickrig.emulators.canopen.node import SecondNodeAlarm
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.door_watch import HostPace, LinkGone, Seen
+from tickrig.emulators.testing.bench.mounts import BusMount
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links import can_link
 from tickrig.host.links.echo import free_of_echo
@@ -127,11 +128,11 @@ def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
     return free_of_echo(link, plan.interface)
 
 
-def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
+def join_bus(mount: BusMount, plan: BusPlan, stack: ExitStack) -> CanBridge:
     """Connect an emulated CAN bus with a python-can bus, and return the bridge between them.
 
     Args:
-        end: end of the emulated bus.
+        mount: emulated bus, with its nodes.
         plan: settings of the python-can bus.
         stack: exit stack that closes the python-can bus at the end.
 
@@ -140,5 +141,5 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
     """
     bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)
-    name = _name_of(plan)
-    return CanBridge(end, port_on(bus, plan.interface, name, LinkGone), name)
+    port = port_on(bus, plan.interface, _name_of(plan), LinkGone)
+    return CanBridge(mount.open_end(), SecondNodeAlarm(port, tuple(mount.nodes.values())))

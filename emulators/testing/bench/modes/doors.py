@@ -230,7 +230,7 @@ class OutsideEnds:
         return port
 
     def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
-        self.bridges.append(bus_doors.join_bus(mount.open_end(), plan, self._stack))
+        self.bridges.append(bus_doors.join_bus(mount, plan, self._stack))
         self.places[mount.name] = plan
 
     def close(self) -> None:

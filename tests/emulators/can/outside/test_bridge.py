@@ -55,35 +55,6 @@ def test_nodes_hear_each_other_and_the_outside_hears_them_once(
     assert log.text == "080# 201#0100 202#0100"
 
 
-@pytest.mark.parametrize(
-    ("mine", "others", "warned"),
-    [
-        ("701#00", "701#00", ["can0: another program also sends 701h: is node 1 emulated twice"]),
-        ("582#60", "080# 582#60 582#60", ["can0: another program also sends 582h: is node 2 emu"]),
-        ("701#00", "701#R 702#00 601#40", []),  # guarding by a master
-        ("181#00", "181#00", []),
-    ],
-)
-def test_a_node_that_is_on_the_bus_twice_is_one_warning(  # noqa: PLR0913, PLR0917 - fixtures
-    host: can.BusABC,
-    port: CanBusPort,
-    caplog: pytest.LogCaptureFixture,
-    mine: str,
-    others: str,
-    warned: list[str],
-) -> None:
-    wire = CanWire()
-    bridge, end = CanBridge(wire.end(), port, "can0"), wire.end()
-    rig = Rig(Station(Node(1), wire.end()), bridges=[bridge], clock=Clock())
-    end.send(0, frames(mine))
-    rig.run_to(10_000)
-    for frame in frames(others):
-        host.send(to_message(frame))
-    rig.run_to(30_000)
-    assert len(caplog.messages) == len(warned)
-    assert all(map(str.startswith, caplog.messages, warned))
-
-
 def test_what_the_outside_sent_is_not_charged_for_being_polled(
     host: can.BusABC, port: CanBusPort
 ) -> None:
