@@ -40,6 +40,7 @@ from tickrig.host.canmon.sources.source import (
     LogCut,
     Source,
     block_log,
+    is_live,
     open_source,
 )
 from tickrig.host.canmon.verbs import decode_options
@@ -52,9 +53,13 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model import survey
     from tickrig.host.canmon.model.check import column_check, diagnosis, learnt
     from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.decode.decoder import Decoder
 else:  # numpy; decoders
+    survey = LazyModule("tickrig.host.canmon.model.survey")
     column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
     diagnosis = LazyModule("tickrig.host.canmon.model.check.diagnosis")
     learnt = LazyModule("tickrig.host.canmon.model.check.learnt")
@@ -180,11 +185,15 @@ def finding_json(finding: TrafficFinding) -> str:
     if finding.record is not None:
         said |= _frame(finding.record)
     if finding.around:
-        said["around"] = [
-            {"t": record.at_us / 1e6, **_frame(record), "text": decoded_text(decoded)}
-            for record, decoded in finding.around
-        ]
+        said["around"] = _around_json(finding.around)
     return json_text(said, letters=True)
+
+
+def _around_json(around: Sequence[tuple[Record, Decoded]]) -> list[dict[str, object]]:
+    return [
+        {"t": record.at_us / 1e6, **_frame(record), "text": decoded_text(decoded)}
+        for record, decoded in around
+    ]
 
 
 def _frame(record: Record) -> dict[str, str]:
@@ -312,6 +321,7 @@ _RULE_FILE: Final = ".toml"
 _STDIN: Final = "-"
 _NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
 _MOST_AROUND: Final = 1_000
+_AROUND: Final = 2
 
 
 @decode_options.source_command(
@@ -322,9 +332,7 @@ _MOST_AROUND: Final = 1_000
     click.option(
         "--around",
         type=click.IntRange(0, _MOST_AROUND),
-        default=2,
-        show_default=True,
-        help="Frames to show before and after a finding of --rule.",
+        help="Frames to show before and after a finding.  [2 with --rule, else none]",
     ),
     click.option(
         "--init", is_flag=True, help="Learn rules from a good log, and write them to -o or stdout."
@@ -356,7 +364,7 @@ def command(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     span_us: int | None,
     cut: LogCut,
-    around: int,
+    around: int | None,
     init: bool,
     output: Path | None,
     most: int | None,
@@ -400,7 +408,7 @@ def command(  # noqa: PLR0913 - options
     files = [Path(word) for word in source if word.endswith(_RULE_FILE)]
     known = _read_learnt(files, options, init=init)
     rules = Rules() if known or init else _read_rules(files, options)
-    _refuse_idle(rules, init=init, jsonl=jsonl)
+    _refuse_idle(rules, words, init=init, jsonl=jsonl)
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     objects = decode_options.read_eds_files(eds) if any(eds) else {}
@@ -412,6 +420,8 @@ def command(  # noqa: PLR0913 - options
             held_frames.learn(output)
             listening.report(held_frames.source, strict)
             return
+        if around is not None:
+            held_frames.show_around(around, decode_options.decoder_of(objects, dbc))
         held_frames.show(jsonl=jsonl, stamp=Stamp(stamp) if stamp else None, most=most)
         held_frames.write(report_path, sarif_path)
         held_frames.end(strict)
@@ -431,7 +441,8 @@ def command(  # noqa: PLR0913 - options
     with closing(frames):
         if not isinstance(frames, BlockLog):
             rates = listening.bit_rates_of(words, bus)
-            held = DecodedCheck(rules, rates, decoder, around, heartbeats)
+            shown_around = _AROUND if around is None else around
+            held = DecodedCheck(rules, rates, decoder, shown_around, heartbeats)
             _one_by_one(frames, words, held, verdict, span_us)
     unjudged = verdict.nothing_judged() if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
@@ -454,6 +465,9 @@ _MOST_FRAMES: Final = 20_000_000
 _SHOWN: Final = 20
 _SHOWN_FRAMES: Final = 3
 """Default number of findings, and of frames per finding, that are shown."""
+
+_Around = tuple[int, "Sequence[tuple[Record, Decoded]]"]
+"""Frames around a finding with their meanings, and the number of the first of them in the log."""
 
 
 class _Usual:
@@ -483,7 +497,18 @@ class _Usual:
         self._cut = cut
         self._make, self._diagnoser = make, make()
         self._watch, self._end_us = listening.Stopwatch(), 0
+        self._around = 0
+        self._decoder: Decoder | None = None
         self.source: AnySource[Columns] | Source
+
+    def show_around(self, frames: int, decoder: Decoder) -> None:
+        """Show frames of the log before and after the first frame of each finding.
+
+        Args:
+            frames: number of frames before the frame, and also after it.
+            decoder: decoder for the shown frames.
+        """
+        self._around, self._decoder = frames, decoder
 
     def listen(self, span_us: int | None) -> None:
         """Read until the user interrupts or the time is over."""
@@ -521,10 +546,30 @@ class _Usual:
             _fault_json if jsonl else partial(_fault_text, lines=lines, most=most or _SHOWN_FRAMES)
         )
         shown = found.faults if jsonl else found.faults[: most or _SHOWN]
+        around = self._frames_around(shown)
         if shown:
             with until_unread():
-                click.echo("\n".join(map(text_of, shown)))
+                texts = (text_of(one, around=_first_of(one, around)) for one in shown)
+                click.echo("\n".join(texts))
         self._said = _more_findings(len(shown), len(found.faults))
+
+    def _frames_around(self, shown: Sequence[diagnosis.BusFault]) -> Mapping[int, _Around]:
+        """Read the log again for the frames around the first frames of findings."""
+        numbers = [one.frames[0].number for one in shown if one.frames]
+        if self._decoder is None or not self._around:
+            return {}
+        with closing(open_source(self._words, self._bus, self._cut)) as again:
+            pieces = iter(lambda: None if again.ended else again.poll(0), None)
+            found = survey.excerpts(pieces, numbers, self._around)
+        shared: dict[int, tuple[Record, Decoded]] = {}  # each frame is decoded once, in order
+        for _, (first, records) in sorted(found.items()):
+            for number, record in enumerate(records, first):
+                if number not in shared:
+                    shared[number] = record, self._decoder.take(record)
+        return {
+            number: (first, [shared[first + at] for at in range(len(records))])
+            for number, (first, records) in found.items()
+        }
 
     def learn(self, output: Path | None) -> None:
         """Write the usual traffic as rules."""
@@ -581,22 +626,36 @@ class _Usual:
             raise _NothingJudged(nothing)
 
 
-def _fault_text(fault: diagnosis.BusFault, lines: DumpLines | None, most: int) -> str:
-    """Return a finding as text, with a line for the time and a line for the frames."""
+def _first_of(fault: diagnosis.BusFault, around: Mapping[int, _Around]) -> _Around | None:
+    return around.get(fault.frames[0].number) if fault.frames else None
+
+
+def _fault_text(
+    fault: diagnosis.BusFault, lines: DumpLines | None, most: int, around: _Around | None
+) -> str:
+    """Return a finding as text, with a line for the time, the frames, and each frame around."""
 
     def time(at_us: int) -> str:
         return lines.stamp(at_us).strip() if lines else f"({seconds_text(at_us, 1)})"
 
     times = "" if fault.amount == 1 else f" [{fault.amount} times]"
-    head = f"{time(fault.first_us)} {fault}{times}"
+    said = [f"{time(fault.first_us)} {fault}{times}"]
     shown = [f"{place.number} {time(place.at_us)}" for place in fault.frames[:most]]
     more = len(fault.frames) - len(shown)
     shown += [f"and {more} more"] * bool(more)
-    return f"{head}\n    frames: {', '.join(shown)}" if shown else head
+    said += [f"    frames: {', '.join(shown)}"] * bool(shown)
+    if around is not None:
+        first, records = around
+        lines = lines or DumpLines(Stamp.ABSOLUTE)
+        for number, (record, decoded) in enumerate(records, first):
+            mark = "  >" if number == fault.frames[0].number else "   "
+            said.append(mark + lines.line(record, decoded_text(decoded)))
+    return "\n".join(said)
 
 
-def _fault_json(fault: diagnosis.BusFault) -> str:
+def _fault_json(fault: diagnosis.BusFault, around: _Around | None) -> str:
     """Return a finding as an object."""
+    shown = {} if around is None else {"around": _around_json(around[1])}
     return json_text(
         {
             "v": 1,
@@ -609,6 +668,7 @@ def _fault_json(fault: diagnosis.BusFault) -> str:
             "text": fault.text,
             "n": fault.amount,
             "frames": [{"n": place.number, "t": place.at_us / 1e6} for place in fault.frames],
+            **shown,
         },
         letters=True,
     )
@@ -618,7 +678,7 @@ _SHOWN_BY: Final = ("around", "most", "report_path", "sarif_path", "jsonl", "sta
 """Options for displaying findings."""
 
 
-def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
+def _refuse_idle(rules: Rules, words: Sequence[str], *, init: bool, jsonl: bool) -> None:
     """Raise Refused for options without an effect."""
     if init:
         refuse_idle("--init shows no finding", *_SHOWN_BY)
@@ -626,8 +686,14 @@ def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
         refuse_idle("it is for the rules of --init", "output")
     if jsonl:
         refuse_idle("--jsonl has its own times, and all findings", "stamp", "most")
-    if not rules.expressions:
+    if rules.expressions:
+        return
+    if not _is_empty(rules):
         refuse_idle("it is for a --rule", "around", "dbc")
+    elif any(map(is_live, words)):
+        refuse_idle("it is for a log, or a --rule", "around", "dbc")
+    elif click.get_current_context().params["around"] is None:
+        refuse_idle("it is for --around, or a --rule", "dbc")
 
 
 class _NothingJudged(click.ClickException):

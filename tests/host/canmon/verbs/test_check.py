@@ -107,6 +107,58 @@ def test_only_so_many_findings_and_frames_are_shown(tmp_path: Path) -> None:
     assert "and 1 finding more: --max 2" in result.stderr
 
 
+REFUSED_SDO = """\
+(1.000000) can0 080#
+(1.001000) can0 602#2F98600063000000
+(1.002000) can0 582#8098600030000906
+(1.003000) can0 080#
+(1.004000) can0 082#2073210000000000
+(1.005000) can0 080#
+"""
+
+
+def test_frames_around_findings_of_all_rules_are_those_of_the_log(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", REFUSED_SDO)
+    plain, around = check(log), check(log, "--around", "2")
+    assert around.exit_code == plain.exit_code == 1
+    assert [line for line in around.stdout.splitlines() if "  can0  " not in line] == (
+        plain.stdout.splitlines()
+    )
+    aborted, emcy = re.split(r"^(?=\(1.00[24]000\) no)", around.stdout, flags=re.MULTILINE)[1:3]
+    assert re.findall(r"^  >.*", aborted, flags=re.MULTILINE)[0].endswith(
+        "2 sdo download 6098h:00 = 0x63 (aborted by server: invalid value (06090030h), 1.0 ms)"
+    )
+    assert len(aborted.splitlines()) == 7  # the finding, its frames, five frames around
+    assert "  > (0000000001.004000)  can0  082" in emcy
+    assert "beginning missing" not in emcy  # a frame of two findings is decoded once
+    zero = check(log, "--around", "1", "-t", "z", "--from", "0.001")
+    assert "  > (000.001000)  can0  582" in zero.stdout
+
+
+def test_frames_around_findings_are_in_json(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", REFUSED_SDO)
+    result = check(log, "--around", "1", "--jsonl")
+    first = json.loads(result.stdout.splitlines()[0])
+    assert [one["frame"] for one in first["around"]] == [
+        *("602#2F98600063000000", "582#8098600030000906", "080#"),
+    ]
+    assert "around" not in json.loads(check(log, "--jsonl").stdout.splitlines()[0])
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("-", "--around", "1"), "--around does nothing here: it is for a log, or a --rule"),
+        (("run.log", "--no-emcy", "--around", "1"), "--around does nothing here: it is for a --ru"),
+        (("run.log", "--dbc", "x.dbc"), "--dbc does nothing here: it is for --around, or a --rule"),
+    ],
+)
+def test_frames_around_findings_need_a_log(words: tuple[str, ...], why: str) -> None:
+    result = check(*words)
+    assert result.exit_code == 2
+    assert why in result.stderr
+
+
 @pytest.mark.parametrize("rule", [["--rule", "emcy never", "--around", "0"], ["--no-emcy"]])
 def test_only_so_many_findings_of_a_rule_are_shown(tmp_path: Path, rule: list[str]) -> None:
     text = "".join(f"({at}.000000) can0 083#3081110000000000\n" for at in range(5))

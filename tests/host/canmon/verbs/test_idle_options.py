@@ -106,8 +106,8 @@ FORMS: dict[str, set[str]] = {
     "graph run.log 185[2]": OPENS | DECODES | {"title", "size", "window_us"},
     "graph run.log 185[2] -o g.svg": OPENS | DECODES | {"window_us"},
     "graph run.log 185[2] -o g.csv": OPENS | DECODES | PICTURES | {"window_us"},
-    "check run.log": OPENS | {"around", "output", "dbc"},
-    "check run.log --jsonl": OPENS | {"init"} | {"around", "output", "dbc", "stamp", "most"},
+    "check run.log": OPENS | {"output", "dbc"},
+    "check run.log --jsonl": OPENS | {"init"} | {"output", "dbc", "stamp", "most"},
     "check run.log --rule 'emcy never'": OPENS | {"init", "output"},
     "check run.log --no-emcy": OPENS | {"init", "around"} | {"init"} | {"output", "dbc"},
     "check run.log --init": OPENS
