@@ -20,7 +20,7 @@ from tickrig.emulators.testing.host_clock.host_code import HostTimeError, Unpatc
 from tickrig.emulators.testing.plugin import bench_source
 from tickrig.emulators.testing.plugin.bench_source import WarmUp, warmed
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
-from tickrig.emulators.testing.plugin.failure_report import faults_that_wait, keep, sections_of
+from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
 from tickrig.emulators.testing.plugin.health import (
     LONG_WAITS,
     THREADS,
@@ -212,7 +212,7 @@ class _BenchedTest(TestWithBench):
             text = "after the test the bench is not as it has to be:"
             pytest.fail("\n".join([text, *found]), pytrace=False)
         self._passed = True
-        for fault in faults_that_wait(bench):
+        for fault in bench._mode.never_begun:
             warnings.warn_explicit(
                 f"a fault of this test never began: {fault}",
                 pytest.PytestWarning,

@@ -149,20 +149,11 @@ def sections_of(test: TestWithBench) -> list[tuple[str, str]]:
     sections = [("bench", _wanted(test)), ("bench: what happened last", last), command]
     if unheard := test.take_unheard():
         sections.insert(1, ("bench: beside the test", "\n".join(unheard)))
-    if waiting := faults_that_wait(test.bench):
+    if waiting := test.bench._mode.never_begun:
         sections.insert(1, ("bench: faults that never began", "\n".join(waiting)))
     if test.kept or test.not_kept:
         sections.append(("bench: what was kept", _kept(test)))
     return sections
-
-
-def faults_that_wait(bench: Bench) -> list[str]:
-    """Return a line for each fault whose condition was never true."""
-    return [
-        f"{order.spec.text}: {order.when} was never true"
-        for order in bench._mode.orders
-        if order.when and order.due_us is None
-    ]
 
 
 def repeat_command(item: pytest.Item) -> str:

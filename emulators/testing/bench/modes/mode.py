@@ -142,6 +142,15 @@ class BenchMode(ABC):
         """The scheduled faults, including those of the rig file, in order."""
         return self._rig.orders
 
+    @property
+    def never_begun(self) -> list[str]:
+        """Descriptions of the faults whose condition was never true."""
+        return [
+            f"{order.spec.text}: {order.when} was never true"
+            for order in self.orders
+            if order.when and order.due_us is None
+        ]
+
     def check_fault(self, owner: str, name: str) -> None:
         """Raise ValueError if a fault does not exist.
 
