@@ -30,7 +30,7 @@ from tickrig.host.text.trace import TraceError
 from tickrig.wire.can import CanFrame
 
 EDS = Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds"
-STORED = Nonvolatile({0x1017 << 8: b"\x05\x00"})
+HEARTBEAT = {0x1017 << 8: b"\x05\x00"}
 SAVE = (b"\x23\x10\x10\x01save", b"\x23\x11\x10\x01load")
 WIRES = {"line": WireEntry(WireType.SERIAL), "can": WireEntry(WireType.CAN)}
 
@@ -42,7 +42,7 @@ class Bench:
         self.line, self.can, self.rrc = SerialLine(), CanWire(), Rrc()
         slaves = {
             "left": make_epos(1),
-            "right": make_epos(2, STORED),
+            "right": make_epos(2, Nonvolatile(dict(HEARTBEAT))),  # it may save
             "io": make_f_palette(3),
             "drive": make_motor_core_unit(4),
             "file": make_slave(read_eds(EDS).make_dictionary(), 5),
