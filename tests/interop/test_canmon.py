@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
@@ -132,6 +133,7 @@ def test_a_reader_that_is_stopped_counts_what_the_kernel_dropped(vcan: Bus, tmp_
     words = [*CANMON, "dump", vcan.channel, "--jsonl", "--strict"]
     with listening(words, tmp_path, "dump") as canmon:
         canmon.process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, canmon.process.pid, os.WSTOPPED)
         run("cangen", vcan.channel, "-g", "0", "-n", str(BURST), "-I", "123", "-L", "8")
         canmon.process.send_signal(signal.SIGCONT)
         wait(lambda: bool(canmon.lines))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from pathlib import Path
 
@@ -26,6 +27,7 @@ def test_a_peer_that_hangs_while_data_flow_does_not_hinder_the_end(tmp_path: Pat
             assert system.tool("rtcon", "@/Out0.rtc:Long", "@/In0.rtc:Long") == (0, "", "")
             assert "Connected to" in system.tool("rtcat", "-l", "@/Out0.rtc:Long")[1]
             peer.process.send_signal(signal.SIGSTOP)
+            os.waitid(os.P_PID, peer.process.pid, os.WSTOPPED)
             code, said = system.end()
             assert code == 0, said
             peer.process.kill()  # else rtls would hang

@@ -84,7 +84,9 @@ class Peer:
         return self.messages.get(topic, [])
 
     def pause(self) -> None:
+        """Let it hang; it does when this returns."""
         os.kill(self.process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, self.process.pid, os.WSTOPPED)
 
     def go_on(self) -> None:
         os.kill(self.process.pid, signal.SIGCONT)

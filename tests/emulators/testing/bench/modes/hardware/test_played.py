@@ -115,6 +115,7 @@ def test_hardware_that_is_stopped_says_nothing_of_the_device(rrc: Child, bench: 
     with RrcClient(bench.link) as client:
         client.start()
         os.kill(rrc.process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, rrc.process.pid, os.WSTOPPED)
         with pytest.raises(LinkTimeout):
             client.start()
         os.kill(rrc.process.pid, signal.SIGCONT)
@@ -125,6 +126,7 @@ def test_hardware_that_is_stopped_says_nothing_of_the_device(rrc: Child, bench: 
 def test_hardware_that_never_answers_is_blocked(rrc: Child, bench: Bench) -> None:
     bench._mode._operators._operators["rrc"]._client._socket.settimeout(0.2)  # type: ignore[attr-defined]
     os.kill(rrc.process.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, rrc.process.pid, os.WSTOPPED)
     with pytest.raises(MachineTooSlow, match="has not answered for"):
         bench.get("state")
     os.kill(rrc.process.pid, signal.SIGCONT)

@@ -64,7 +64,9 @@ class Peer:
         return json.loads(self._process.stdout.readline())
 
     def pause(self) -> None:
+        """Let it hang; it does when this returns."""
         os.kill(self._process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, self._process.pid, os.WSTOPPED)
 
     def resume(self) -> None:
         os.kill(self._process.pid, signal.SIGCONT)
