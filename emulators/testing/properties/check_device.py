@@ -163,9 +163,8 @@ def _shortest(
             return False
 
         needed[name] = shortened(needed[name], fails)
-    if shortest is not error:
-        words = [f"{name}={session!r}" for name, session in needed.items()]
-        shortest.add_note("no act can be left out: " + ", ".join(words))
+    words = [f"{name}={session!r}" for name, session in needed.items()]
+    shortest.add_note("no act can be left out: " + ", ".join(words))
     return shortest
 
 
