@@ -27,6 +27,7 @@ The module also writes frames as lines of text, as candump does.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -406,6 +407,18 @@ class DumpLines:
         stamp = self.stamp(record.at_us)
         data = f"{_data(record.frame):<{DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
         return f"{stamp}  {record.channel}{direction}  {ident:>{self.width}}  {data}"
+
+    def around(self, shown: Iterable[tuple[Record, Decoded]], marked: Record | None) -> list[str]:
+        """Return the lines of decoded frames around a finding.
+
+        Args:
+            shown: frames and their meanings.
+            marked: frame of the finding, whose line begins with a mark, or None for no mark.
+        """
+        return [
+            ("  >" if record is marked else "   ") + self.line(record, decoded_text(decoded))
+            for record, decoded in shown
+        ]
 
     def stamp(self, at_us: int) -> str:
         """Return the prefix of a line for this time."""

@@ -561,15 +561,7 @@ class _Usual:
         with closing(open_source(self._words, self._bus, self._cut)) as again:
             pieces = iter(lambda: None if again.ended else again.poll(0), None)
             found = survey.excerpts(pieces, numbers, self._around)
-        shared: dict[int, tuple[Record, Decoded]] = {}  # each frame is decoded once, in order
-        for _, (first, records) in sorted(found.items()):
-            for number, record in enumerate(records, first):
-                if number not in shared:
-                    shared[number] = record, self._decoder.take(record)
-        return {
-            number: (first, [shared[first + at] for at in range(len(records))])
-            for number, (first, records) in found.items()
-        }
+        return self._decoder.take_excerpts(found)
 
     def learn(self, output: Path | None) -> None:
         """Write the usual traffic as rules."""
@@ -646,10 +638,8 @@ def _fault_text(
     said += [f"    frames: {', '.join(shown)}"] * bool(shown)
     if around is not None:
         first, records = around
-        lines = lines or DumpLines(Stamp.ABSOLUTE)
-        for number, (record, decoded) in enumerate(records, first):
-            mark = "  >" if number == fault.frames[0].number else "   "
-            said.append(mark + lines.line(record, decoded_text(decoded)))
+        marked = records[fault.frames[0].number - first][0]
+        said += (lines or DumpLines(Stamp.ABSOLUTE)).around(records, marked)
     return "\n".join(said)
 
 

@@ -184,11 +184,7 @@ def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
     shown = seen.diagnosis.faults[:_MOST_AROUND] if around else ()
     numbers = [one.frames[0].number for one in shown if one.frames]
     found = seen.around(numbers, around) if seen.in_columns else read.around(numbers, around)
-    decoded = {
-        number: (first, [(record, seen.decoder.take(record)) for record in records])
-        for number, (first, records) in found.items()
-    }
-    return report_page.Verdict(seen.diagnosis, decoded)
+    return report_page.Verdict(seen.diagnosis, seen.decoder.take_excerpts(found))
 
 
 class _Seen:

@@ -336,6 +336,8 @@ class Never(RuleDemand):
         event: event that selects the forbidden frames.
     """
 
+    forbids = True
+
     def __init__(self, event: RuleEvent) -> None:
         self._matches = event.matches
 

@@ -13,7 +13,6 @@ from tickrig.host.canmon.model.frames import (
     Record,
     Stamp,
     any_ident,
-    decoded_text,
     ident_text,
     ms_text,
     sender_of,
@@ -72,11 +71,7 @@ class TrafficFinding(NamedTuple):
         if not self.around:
             return head
         lines = lines or DumpLines(Stamp.ABSOLUTE)
-        shown = [
-            ("  >" if record is self.record else "   ") + lines.line(record, decoded_text(decoded))
-            for record, decoded in self.around
-        ]
-        return "\n".join([head, *shown])
+        return "\n".join([head, *lines.around(self.around, self.record)])
 
     def _line(self, stamp: str) -> str:
         shown = f" [{self.record.channel} {self.record.frame}]" if self.record else ""

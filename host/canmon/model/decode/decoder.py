@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Protocol
@@ -549,6 +550,25 @@ class Decoder:
         if bus is None:
             bus = self.bus(record.channel)
         return bus.take(record.at_us, frame)
+
+    def take_excerpts(
+        self, excerpts: Mapping[int, tuple[int, Sequence[Record]]]
+    ) -> dict[int, tuple[int, list[tuple[Record, Decoded]]]]:
+        """Decode excerpts of a log. A frame that several of them contain is decoded once.
+
+        Args:
+            excerpts: excerpts by any key. Each is the number of its first frame in the log, and
+                its frames.
+        """
+        taken: dict[int, Decoded] = {}
+        for first, records in sorted(excerpts.values(), key=itemgetter(0)):
+            for number, record in enumerate(records, first):
+                if number not in taken:
+                    taken[number] = self.take(record)
+        return {
+            key: (first, [(one, taken[number]) for number, one in enumerate(records, first)])
+            for key, (first, records) in excerpts.items()
+        }
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the running SDO transfers, as if they ended now."""

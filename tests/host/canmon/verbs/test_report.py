@@ -346,3 +346,13 @@ def test_a_mutated_log_has_a_page_or_one_line(
 def test_two_thousand_mutated_logs_have_the_same_page_both_ways(seed: int) -> None:
     for number in range(500):
         mutations.judge(*mutations.mutated(random.Random(f"{seed} {number}")))
+
+
+def test_a_frame_around_two_findings_is_decoded_once(tmp_path: Path) -> None:
+    log, page = tmp_path / "run.log", tmp_path / "page.html"
+    frames = "080# 602#2F98600063000000 582#8098600030000906 080# 082#2073210000000000 080#"
+    lines = [f"(1.00{at}000) can0 {frame}\n" for at, frame in enumerate(frames.split())]
+    log.write_text("".join(lines), "ascii")
+    result = CliRunner().invoke(main, ["report", str(log), "-o", str(page), "--around", "2"])
+    assert result.exit_code == 0, result.stderr
+    assert "beginning missing" not in page.read_text("utf-8")
