@@ -134,7 +134,6 @@ class HardwareMode(BenchMode):
     def clear(self, owner: str, fault: str) -> None:
         """Let the operator clear a fault. If the fault waits for its condition, cancel it, too."""
         self._rig.cancel(self._rig.state.full_fault_name(owner, fault))
-        self._pending = [entry for entry in self._pending if self._rig.is_ordered(entry[2])]
         self._operators.clear(owner, fault)
 
     def switch_power(self, owner: str, *, on: bool) -> None:
@@ -221,9 +220,11 @@ class HardwareMode(BenchMode):
         try:
             for entry in tuple(self._pending):
                 condition, begin, order = entry
-                if self._rig.is_ordered(order) and condition():
+                is_cancelled = not self._rig.is_ordered(order)
+                if is_cancelled or condition():
                     self._pending.remove(entry)
-                    begin(self.now_us)
+                    if not is_cancelled:
+                        begin(self.now_us)
         finally:
             self._looking = False
 

@@ -324,20 +324,20 @@ def _arm(rig: BenchRig, order: FaultOrder, condition: Condition | None) -> None:
     """Start or schedule a fault."""
 
     def begin() -> None:
+        now_us = rig.effective_us
+        rig.operator.fault(now_us, order.begin(now_us))
+
+    def begin_unless_cancelled() -> None:
         if rig.is_ordered(order):
-            now_us = rig.effective_us
-            rig.operator.fault(now_us, order.begin(now_us))
+            begin()
 
     rig.operator.check_fault(order.spec)
-    rig.orders.append(order)
-    try:
-        if condition is None:
-            begin()
-        else:
-            when(rig, condition, begin)
-    except BaseException:
-        rig.orders.remove(order)
-        raise
+    if condition is None:
+        begin()
+        rig.orders.append(order)
+    else:
+        rig.orders.append(order)
+        when(rig, lambda: not rig.is_ordered(order) or condition(), begin_unless_cancelled)
 
 
 def _clear(rig: BenchRig, fault: str) -> None:

@@ -481,3 +481,21 @@ def test_a_time_as_text_has_its_unit() -> None:
         with pytest.raises(ValueError, match="'5' has no unit: write 5s, 5ms or 5us"):
             bench.press("power_button", for_="5")
         assert bench.now_us == 0
+
+
+def test_a_cancelled_fault_is_not_watched_any_more() -> None:
+    with Bench("rrc") as bench:
+        asked: list[int] = []
+
+        def never() -> bool:
+            asked.append(bench.now_us)
+            return False
+
+        before = bench._mode.act(lambda rig: len(rig.rig.watchers))
+        bench.fault("vr2_fault", when=never)
+        bench.run_for("5ms")
+        bench.clear("vr2_fault")
+        count = len(asked)
+        bench.run_for("20ms")
+        assert (len(asked), bench.get("vr2_fault")) == (count, 0)
+        assert bench._mode.act(lambda rig: len(rig.rig.watchers)) == before
